@@ -1,0 +1,440 @@
+//! Genome container, version 1. `docs/genome-format.md` describes it byte by byte.
+//!
+//! ```text
+//! 0     4  magic "MSGE"
+//! 4     1  format version, 1
+//! 5     1  header length h
+//! 6     2  length of the whole container
+//! 8     h  header: kernel, topology, provenance, counts (postcard)
+//! 8+h  2w  weights, little-endian i16, Q3.12
+//! end   4  CRC-32C of everything before
+//! ```
+//!
+//! Decoding borrows the bytes. Every accepted container is the only encoding of what it holds:
+//! encoding that again gives the same bytes.
+
+use crate::activation::{KERNEL_ID, KernelId};
+use crate::genome::Genome;
+use crate::sensor::SensorModel;
+use crate::topology::{MAX_WEIGHTS, Prediction, Template, Topology, TopologyError};
+use crc::{CRC_32_ISCSI, Crc, Table};
+use serde::{Deserialize, Serialize};
+
+/// First bytes of every container.
+pub const MAGIC: [u8; 4] = *b"MSGE";
+/// The version that this crate reads and writes.
+pub const FORMAT_VERSION: u8 = 1;
+/// Bytes before the header.
+pub const PREFIX_BYTES: usize = 8;
+/// Most bytes of a header.
+pub const HEADER_BYTES_MAX: usize = 53;
+/// Bytes of the checksum.
+pub const CRC_BYTES: usize = 4;
+/// Most bytes of a container; a buffer of this size holds any genome.
+pub const CONTAINER_BYTES_MAX: usize =
+    PREFIX_BYTES + HEADER_BYTES_MAX + 2 * MAX_WEIGHTS + CRC_BYTES;
+
+/// CRC-32C (Castagnoli): the checksum of the container.
+pub static CRC_32C: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
+
+/// Where a genome comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Provenance {
+    /// Seed of the evolutionary run, if it is known.
+    pub seed: Option<u64>,
+    /// Generation that the genome belongs to, counted from 0.
+    pub generation: u32,
+    /// Correctly predicted bits of the repetition that gave the genome its fitness.
+    pub matched_bits: u64,
+    /// Bits sensed in that repetition: fitness is `matched_bits / scored_bits`; 0 if unknown.
+    pub scored_bits: u64,
+}
+
+/// The header as it is serialised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Header {
+    kernel: KernelId,
+    model: u8,
+    prediction: u8,
+    template: u8,
+    provenance: Provenance,
+    action_weights: u16,
+    prediction_weights: u16,
+}
+
+/// The bytes are not a genome that this controller can run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum DecodeError {
+    /// The bytes end before the container does.
+    #[error("too short: {found} bytes of at least {needed}")]
+    TooShort {
+        /// Bytes given.
+        found: usize,
+        /// Bytes needed, as far as is known.
+        needed: usize,
+    },
+    /// There is more than the container.
+    #[error("{found} bytes, but the container ends after {length}")]
+    TrailingBytes {
+        /// Bytes given.
+        found: usize,
+        /// Bytes of the container.
+        length: usize,
+    },
+    /// It does not start with [`MAGIC`].
+    #[error("not a genome: it starts with {found:02x?} instead of {MAGIC:02x?} (\"MSGE\")")]
+    WrongMagic {
+        /// The first four bytes.
+        found: [u8; 4],
+    },
+    /// Written in a format that this program does not know.
+    #[error("format version {found}; this program reads version {FORMAT_VERSION}")]
+    UnknownVersion {
+        /// The version byte.
+        found: u8,
+    },
+    /// The checksum does not match: the bytes were damaged.
+    #[error("damaged: CRC-32C is {found:08x}, the bytes give {computed:08x}")]
+    BadCrc {
+        /// The checksum stored.
+        found: u32,
+        /// The checksum of the bytes.
+        computed: u32,
+    },
+    /// The header does not decode, or is not written the one way it is allowed to be.
+    #[error("the header is malformed")]
+    MalformedHeader,
+    /// Evolved under another arithmetic.
+    #[error("evolved for kernel {found}; this controller is kernel {KERNEL_ID}")]
+    OtherKernel {
+        /// The kernel of the genome.
+        found: KernelId,
+    },
+    /// No such sensor model.
+    #[error("unknown sensor model {found}; 0 to 2 stand for A to C")]
+    UnknownModel {
+        /// The model byte.
+        found: u8,
+    },
+    /// No such kind of prediction or template.
+    #[error(
+        "unknown prediction scheme {prediction} with template {template}; \
+         0 is free (template 0), 1 partly predefined, 2 predefined (template 1 to 4)"
+    )]
+    UnknownPrediction {
+        /// The byte for the kind of prediction.
+        prediction: u8,
+        /// The byte for the template.
+        template: u8,
+    },
+    /// The model does not go with the predictions.
+    #[error(transparent)]
+    NoSuchTopology(#[from] TopologyError),
+    /// The numbers of weights are not the topology's, or not those that the length leaves room for.
+    #[error(
+        "{action} action and {prediction} prediction weights in {bytes} bytes; \
+         the topology has {expected_action} and {expected_prediction}"
+    )]
+    SizesDoNotFit {
+        /// Action weights announced.
+        action: u16,
+        /// Prediction weights announced.
+        prediction: u16,
+        /// Bytes of the weight block.
+        bytes: usize,
+        /// Action weights of the topology.
+        expected_action: usize,
+        /// Prediction weights of the topology.
+        expected_prediction: usize,
+    },
+    /// −32768 is not a weight.
+    #[error("weight {index} is −32768; weights are within ±32767")]
+    InvalidWeight {
+        /// Place of the weight.
+        index: usize,
+    },
+}
+
+/// The buffer is too small for the container.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[error("a buffer of {found} bytes; at most {CONTAINER_BYTES_MAX} are needed")]
+pub struct BufferTooSmall {
+    /// Bytes of the buffer.
+    pub found: usize,
+}
+
+/// A container that has passed every check; borrows its bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct EncodedGenome<'a> {
+    topology: Topology,
+    provenance: Provenance,
+    weights: &'a [u8],
+}
+
+impl<'a> EncodedGenome<'a> {
+    /// Checks everything there is to check.
+    ///
+    /// # Errors
+    /// [`DecodeError`]: the first thing found wrong, in the order magic, version, length, checksum,
+    /// header, kernel, topology, sizes, weights.
+    pub fn decode(bytes: &'a [u8]) -> Result<Self, DecodeError> {
+        let body = checked_body(bytes)?;
+        let header_length = usize::from(body[5]);
+        let block = &body[PREFIX_BYTES..];
+        if header_length > HEADER_BYTES_MAX || header_length > block.len() {
+            return Err(DecodeError::MalformedHeader);
+        }
+        let (header_bytes, weights) = block.split_at(header_length);
+        let header = decode_header(header_bytes)?;
+        if header.kernel != KERNEL_ID {
+            return Err(DecodeError::OtherKernel {
+                found: header.kernel,
+            });
+        }
+        let topology = topology_from_codes(header.model, header.prediction, header.template)?;
+        if usize::from(header.action_weights) != topology.action_weights()
+            || usize::from(header.prediction_weights) != topology.prediction_weights()
+            || weights.len() != 2 * topology.weights()
+        {
+            return Err(DecodeError::SizesDoNotFit {
+                action: header.action_weights,
+                prediction: header.prediction_weights,
+                bytes: weights.len(),
+                expected_action: topology.action_weights(),
+                expected_prediction: topology.prediction_weights(),
+            });
+        }
+        let genome = Self {
+            topology,
+            provenance: header.provenance,
+            weights,
+        };
+        match genome.weights().position(|weight| weight == i16::MIN) {
+            Some(index) => Err(DecodeError::InvalidWeight { index }),
+            None => Ok(genome),
+        }
+    }
+
+    /// The topology.
+    #[must_use]
+    pub fn topology(&self) -> Topology {
+        self.topology
+    }
+
+    /// Where the genome comes from.
+    #[must_use]
+    pub fn provenance(&self) -> Provenance {
+        self.provenance
+    }
+
+    /// The weights, Q3.12, in genome order.
+    pub fn weights(&self) -> impl ExactSizeIterator<Item = i16> + use<'a> {
+        self.weights
+            .chunks_exact(2)
+            .map(|pair| i16::from_le_bytes([pair[0], pair[1]]))
+    }
+
+    /// A copy of the weights in fixed memory.
+    #[must_use]
+    pub fn to_genome(&self) -> Genome {
+        Genome::from_iter(self.topology, self.weights())
+    }
+}
+
+/// Writes the container to the front of `buffer` and returns that part of it.
+///
+/// # Errors
+/// [`BufferTooSmall`]; [`CONTAINER_BYTES_MAX`] bytes are always enough.
+pub fn encode<'b>(
+    genome: &Genome,
+    provenance: Provenance,
+    buffer: &'b mut [u8],
+) -> Result<&'b [u8], BufferTooSmall> {
+    let found = buffer.len();
+    let too_small = BufferTooSmall { found };
+    let topology = genome.topology();
+    let (model, prediction, template) = codes_of_topology(topology);
+    let header = Header {
+        kernel: KERNEL_ID,
+        model,
+        prediction,
+        template,
+        provenance,
+        action_weights: topology.action_weights() as u16,
+        prediction_weights: topology.prediction_weights() as u16,
+    };
+    let mut header_buffer = [0; HEADER_BYTES_MAX];
+    let header_bytes = postcard::to_slice(&header, &mut header_buffer).map_err(|_| too_small)?;
+    let length = PREFIX_BYTES + header_bytes.len() + 2 * topology.weights() + CRC_BYTES;
+    let container = buffer.get_mut(..length).ok_or(too_small)?;
+    let (body, crc) = container.split_at_mut(length - CRC_BYTES);
+    let (prefix, rest) = body.split_at_mut(PREFIX_BYTES);
+    let (header_place, weights_place) = rest.split_at_mut(header_bytes.len());
+    prefix[..4].copy_from_slice(&MAGIC);
+    prefix[4] = FORMAT_VERSION;
+    prefix[5] = header_bytes.len() as u8;
+    prefix[6..].copy_from_slice(&(length as u16).to_le_bytes());
+    header_place.copy_from_slice(header_bytes);
+    for (place, weight) in weights_place.chunks_exact_mut(2).zip(genome.weights()) {
+        place.copy_from_slice(&weight.to_le_bytes());
+    }
+    crc.copy_from_slice(&CRC_32C.checksum(body).to_le_bytes());
+    Ok(container)
+}
+
+/// Length of the container that starts with these bytes, from its first [`PREFIX_BYTES`].
+///
+/// # Errors
+/// [`DecodeError::TooShort`], [`DecodeError::WrongMagic`] or [`DecodeError::UnknownVersion`].
+pub fn container_length(bytes: &[u8]) -> Result<usize, DecodeError> {
+    let Some(prefix) = bytes.first_chunk::<PREFIX_BYTES>() else {
+        return Err(DecodeError::TooShort {
+            found: bytes.len(),
+            needed: PREFIX_BYTES + CRC_BYTES,
+        });
+    };
+    let [m0, m1, m2, m3, version, _, length_low, length_high] = *prefix;
+    let magic = [m0, m1, m2, m3];
+    if magic != MAGIC {
+        return Err(DecodeError::WrongMagic { found: magic });
+    }
+    if version != FORMAT_VERSION {
+        return Err(DecodeError::UnknownVersion { found: version });
+    }
+    Ok(usize::from(u16::from_le_bytes([length_low, length_high])))
+}
+
+/// Magic, version, length and checksum; returns everything before the checksum, at least the
+/// prefix.
+fn checked_body(bytes: &[u8]) -> Result<&[u8], DecodeError> {
+    let length = container_length(bytes)?;
+    let found = bytes.len();
+    let shortest = PREFIX_BYTES + CRC_BYTES;
+    if found < length || found < shortest {
+        return Err(DecodeError::TooShort {
+            found,
+            needed: length.max(shortest),
+        });
+    }
+    if found > length {
+        return Err(DecodeError::TrailingBytes { found, length });
+    }
+    let Some((body, crc)) = bytes.split_last_chunk::<CRC_BYTES>() else {
+        return Err(DecodeError::TooShort {
+            found,
+            needed: shortest,
+        });
+    };
+    let found = u32::from_le_bytes(*crc);
+    let computed = CRC_32C.checksum(body);
+    if found == computed {
+        Ok(body)
+    } else {
+        Err(DecodeError::BadCrc { found, computed })
+    }
+}
+
+/// postcard accepts more than one spelling of a number; only the one it writes itself is allowed.
+fn decode_header(bytes: &[u8]) -> Result<Header, DecodeError> {
+    let (header, rest): (Header, _) =
+        postcard::take_from_bytes(bytes).map_err(|_| DecodeError::MalformedHeader)?;
+    let mut buffer = [0; HEADER_BYTES_MAX];
+    match postcard::to_slice(&header, &mut buffer) {
+        Ok(again) if rest.is_empty() && *again == *bytes => Ok(header),
+        _ => Err(DecodeError::MalformedHeader),
+    }
+}
+
+fn codes_of_topology(topology: Topology) -> (u8, u8, u8) {
+    let model = match topology.model() {
+        SensorModel::A => 0,
+        SensorModel::B => 1,
+        SensorModel::C => 2,
+    };
+    let (prediction, template) = match topology.prediction() {
+        Prediction::Free => (0, None),
+        Prediction::PartlyPredefined(template) => (1, Some(template)),
+        Prediction::Predefined(template) => (2, Some(template)),
+    };
+    let template = match template {
+        None => 0,
+        Some(Template::Line) => 1,
+        Some(Template::Pair) => 2,
+        Some(Template::Square) => 3,
+        Some(Template::TriangularLattice) => 4,
+    };
+    (model, prediction, template)
+}
+
+fn topology_from_codes(model: u8, prediction: u8, template: u8) -> Result<Topology, DecodeError> {
+    let model = match model {
+        0 => SensorModel::A,
+        1 => SensorModel::B,
+        2 => SensorModel::C,
+        found => return Err(DecodeError::UnknownModel { found }),
+    };
+    let prediction = match (prediction, template) {
+        (0, 0) => Prediction::Free,
+        (1 | 2, 1..=4) => {
+            let template = match template {
+                1 => Template::Line,
+                2 => Template::Pair,
+                3 => Template::Square,
+                _ => Template::TriangularLattice,
+            };
+            if prediction == 1 {
+                Prediction::PartlyPredefined(template)
+            } else {
+                Prediction::Predefined(template)
+            }
+        }
+        _ => {
+            return Err(DecodeError::UnknownPrediction {
+                prediction,
+                template,
+            });
+        }
+    };
+    Ok(Topology::new(model, prediction)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_header_fits() {
+        let header = Header {
+            kernel: KERNEL_ID,
+            model: 2,
+            prediction: 2,
+            template: 4,
+            provenance: Provenance {
+                seed: Some(u64::MAX),
+                generation: u32::MAX,
+                matched_bits: u64::MAX,
+                scored_bits: u64::MAX,
+            },
+            action_weights: u16::MAX,
+            prediction_weights: u16::MAX,
+        };
+        let mut buffer = [0; HEADER_BYTES_MAX];
+        let bytes = postcard::to_slice(&header, &mut buffer).unwrap();
+        assert_eq!(bytes.len(), HEADER_BYTES_MAX);
+    }
+
+    #[test]
+    fn topologies_and_their_codes_correspond() {
+        for topology in Topology::ALL {
+            let (model, prediction, template) = codes_of_topology(topology);
+            assert_eq!(
+                topology_from_codes(model, prediction, template),
+                Ok(topology)
+            );
+        }
+    }
+}

@@ -1,0 +1,307 @@
+//! The controller of one robot: immutable weights, a small state, and one step.
+
+use crate::codec::EncodedGenome;
+use crate::genome::Genome;
+use crate::network::{ActionNetwork, MAX_HIDDEN, PredictionNetwork};
+use crate::sensor::SensorBits;
+use crate::topology::Topology;
+
+/// What a robot does in a step. There is no stopping.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Action {
+    /// One cell ahead, if it is free. Action value 0.
+    #[default]
+    Straight,
+    /// A quarter turn. Action value 1.
+    Turn,
+}
+
+/// Which way a robot turns; decided in every step, carried out with [`Action::Turn`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Turn {
+    /// To the left.
+    #[default]
+    CounterClockwise,
+    /// To the right.
+    Clockwise,
+}
+
+/// What one step decides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Decision {
+    /// What to do.
+    pub action: Action,
+    /// Which way, if it turns.
+    pub turn: Turn,
+    /// Expected next reading, fixed predictions included.
+    pub prediction: SensorBits,
+}
+
+/// The two networks of a genome, ready to run. Shared by all robots of a swarm.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Controller {
+    topology: Topology,
+    action: ActionNetwork,
+    prediction: Option<PredictionNetwork>,
+}
+
+/// What one robot remembers from step to step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct State {
+    hidden_q3_12: [i16; MAX_HIDDEN],
+    last_action: Action,
+    prediction: SensorBits,
+    surprise: Surprise,
+}
+
+/// Bits that a robot mispredicted, of all that it sensed.
+///
+/// One minus their ratio, over all robots, is the fitness of Eq. 1 of the paper.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Surprise {
+    /// Bits that were not as predicted.
+    pub mispredicted_bits: u64,
+    /// Bits sensed.
+    pub seen_bits: u64,
+}
+
+impl Surprise {
+    /// Mispredicted share in Q16, 0 (every bit foreseen) to 65,536 (none), rounded down; 0 before
+    /// the first step.
+    #[must_use]
+    pub fn share_q16(self) -> u32 {
+        match (self.mispredicted_bits << 16).checked_div(self.seen_bits) {
+            Some(share) => share as u32,
+            None => 0,
+        }
+    }
+}
+
+impl Controller {
+    /// Works out everything that a genome settles once and for all.
+    #[must_use]
+    pub fn new(genome: &Genome) -> Self {
+        Self::build(genome.topology(), &mut genome.weights().iter().copied())
+    }
+
+    /// [`Controller::new`] straight from a checked container, without a copy of the weights.
+    #[must_use]
+    pub fn from_encoded(genome: &EncodedGenome<'_>) -> Self {
+        Self::build(genome.topology(), &mut genome.weights())
+    }
+
+    fn build(topology: Topology, weights: &mut impl Iterator<Item = i16>) -> Self {
+        Self {
+            topology,
+            action: ActionNetwork::from_weights(topology.action_shape(), weights),
+            prediction: topology
+                .prediction_shape()
+                .map(|shape| PredictionNetwork::from_weights(shape, weights)),
+        }
+    }
+
+    /// One control step: scores the last prediction against `sensors`, decides on an action with
+    /// the last one as an input, and predicts the next reading with the action just chosen.
+    ///
+    /// Bits beyond the model's sensors are ignored. Cannot fail, panic or allocate.
+    #[inline]
+    pub fn step(&self, state: &mut State, sensors: SensorBits) -> Decision {
+        let (action, turn) = self.decide(sensors, state.last_action);
+        let prediction = self.predict(state, sensors, action);
+        Decision {
+            action,
+            turn,
+            prediction,
+        }
+    }
+
+    /// The action network alone: a function of the sensor bits and the last action.
+    #[inline]
+    #[must_use]
+    pub fn decide(&self, sensors: SensorBits, last_action: Action) -> (Action, Turn) {
+        let outputs = self
+            .action
+            .forward(self.inputs(sensors, last_action), &mut [0; 8]);
+        let action = if outputs & 1 == 0 {
+            Action::Straight
+        } else {
+            Action::Turn
+        };
+        let turn = if outputs & 2 == 0 {
+            Turn::CounterClockwise
+        } else {
+            Turn::Clockwise
+        };
+        (action, turn)
+    }
+
+    /// The rest of a step, the action being settled: scores the last prediction and makes the next.
+    #[inline]
+    pub fn predict(&self, state: &mut State, sensors: SensorBits, action: Action) -> SensorBits {
+        let sensors = SensorBits::new(sensors.bits() & self.topology.model().mask().bits());
+        state.surprise.mispredicted_bits += u64::from(state.prediction.differing(sensors));
+        state.surprise.seen_bits += self.topology.sensors() as u64;
+        state.last_action = action;
+        if let Some(network) = &self.prediction {
+            let outputs = network.forward(self.inputs(sensors, action), &mut state.hidden_q3_12);
+            let free = spread(outputs, self.topology.predicted().bits());
+            state.prediction = SensorBits::new(self.topology.fixed().bits() | free);
+        }
+        state.prediction
+    }
+
+    /// The topology of the genome.
+    #[must_use]
+    pub fn topology(&self) -> Topology {
+        self.topology
+    }
+
+    /// The action network.
+    #[must_use]
+    pub fn action_network(&self) -> &ActionNetwork {
+        &self.action
+    }
+
+    /// The prediction network, unless all predictions are fixed.
+    #[must_use]
+    pub fn prediction_network(&self) -> Option<&PredictionNetwork> {
+        self.prediction.as_ref()
+    }
+
+    /// Sensor bits with the action value behind them.
+    #[inline]
+    fn inputs(&self, sensors: SensorBits, action: Action) -> u32 {
+        let model = self.topology.model();
+        u32::from(sensors.bits() & model.mask().bits()) | (action as u32) << model.sensors()
+    }
+}
+
+/// Puts the lowest bits of `bits` where `mask` has ones, in order.
+#[inline]
+#[must_use]
+pub fn spread(bits: u16, mask: u16) -> u16 {
+    if mask & (mask.wrapping_add(1)) == 0 {
+        return bits & mask;
+    }
+    let mut left = mask;
+    let mut bits = bits;
+    let mut spread = 0;
+    while left != 0 {
+        let lowest = left & left.wrapping_neg();
+        if bits & 1 == 1 {
+            spread |= lowest;
+        }
+        bits >>= 1;
+        left ^= lowest;
+    }
+    spread
+}
+
+impl State {
+    /// A robot at its start: hidden values zero, last action straight, predicting nothing but what
+    /// is fixed.
+    #[must_use]
+    pub fn new(controller: &Controller) -> Self {
+        Self {
+            hidden_q3_12: [0; MAX_HIDDEN],
+            last_action: Action::Straight,
+            prediction: controller.topology.fixed(),
+            surprise: Surprise::default(),
+        }
+    }
+
+    /// The prediction for the next reading.
+    #[must_use]
+    pub fn prediction(&self) -> SensorBits {
+        self.prediction
+    }
+
+    /// The action of the last step; straight before the first.
+    #[must_use]
+    pub fn last_action(&self) -> Action {
+        self.last_action
+    }
+
+    /// The prediction network's hidden activations, Q3.12; zero beyond its neurons.
+    #[must_use]
+    pub fn hidden_q3_12(&self) -> &[i16; MAX_HIDDEN] {
+        &self.hidden_q3_12
+    }
+
+    /// Surprise since the start, the number that a robot reports.
+    #[must_use]
+    pub fn surprise(&self) -> Surprise {
+        self.surprise
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::genome::Genome;
+    use crate::sensor::SensorModel;
+    use crate::topology::{Prediction, Template};
+    use rand_chacha::ChaCha8Rng;
+    use rand_core::{Rng, SeedableRng};
+
+    #[test]
+    fn spread_fills_the_ones_of_the_mask_in_order() {
+        assert_eq!(spread(0b101, 0b0011_0110), 0b0001_0010);
+        assert_eq!(spread(0xffff, 0x3fff), 0x3fff);
+        assert_eq!(spread(0xffff, 0), 0);
+    }
+
+    #[test]
+    fn surprise_counts_the_bits_that_were_not_predicted() {
+        let topology = Topology::new(SensorModel::B, Prediction::Predefined(Template::Line));
+        let controller = Controller::new(&Genome::zeroed(topology.unwrap()));
+        let mut state = State::new(&controller);
+        assert_eq!(state.surprise().share_q16(), 0);
+        controller.step(&mut state, SensorBits::new(0b00_1001));
+        controller.step(&mut state, SensorBits::new(0b11_0001));
+        let surprise = state.surprise();
+        assert_eq!((surprise.mispredicted_bits, surprise.seen_bits), (3, 12));
+        assert_eq!(surprise.share_q16(), 65_536 / 4);
+    }
+
+    #[test]
+    fn bits_beyond_the_sensors_change_nothing() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for topology in Topology::ALL {
+            let controller = Controller::new(&Genome::random(topology, &mut rng));
+            let (mut with, mut without) = (State::new(&controller), State::new(&controller));
+            for _ in 0..200 {
+                let bits = rng.next_u32() as u16;
+                let masked = bits & topology.model().mask().bits();
+                assert_eq!(
+                    controller.step(&mut with, SensorBits::new(bits)),
+                    controller.step(&mut without, SensorBits::new(masked))
+                );
+            }
+            assert_eq!(with, without);
+        }
+    }
+
+    #[test]
+    fn fixed_predictions_never_change() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        for topology in Topology::ALL {
+            let controller = Controller::new(&Genome::random(topology, &mut rng));
+            let mut state = State::new(&controller);
+            let predicted = topology.predicted().bits();
+            for _ in 0..100 {
+                let decision = controller.step(&mut state, SensorBits::new(rng.next_u32() as u16));
+                assert_eq!(
+                    decision.prediction.bits() & !predicted,
+                    topology.fixed().bits()
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! Genomes: the weights of both networks, and the operators of evolution.
+//!
+//! The operators take any [`rand_core::Rng`], so that a robot can evolve with the host's
+//! operators. Given the same generator state they give the same genome on every machine.
+
+use crate::fixed::WEIGHT_MAX_Q3_12;
+use crate::topology::{MAX_WEIGHTS, Topology};
+use rand_core::Rng;
+
+/// Initial weights are uniform in ± this (0.5 in Q3.12), ends included.
+pub const INITIAL_WEIGHT_MAX_Q3_12: i16 = 2048;
+
+/// Mutation adds a value uniform in ± this (0.4 in Q3.12), ends included.
+pub const MUTATION_MAX_Q3_12: i16 = 1638;
+
+/// The weights of an action network and, unless all predictions are fixed, a prediction network.
+///
+/// Fixed memory, room for any topology. Weights are Q3.12 within ±32767, in the order described
+/// in [`network`](crate::network): the action network's, then the prediction network's.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Genome {
+    topology: Topology,
+    weights: [i16; MAX_WEIGHTS],
+}
+
+/// These weights are not a genome.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum GenomeError {
+    /// The number of weights is not the topology's.
+    #[error("{found} weights; the topology has {expected}")]
+    WrongCount {
+        /// Weights given.
+        found: usize,
+        /// Weights of the topology.
+        expected: usize,
+    },
+    /// −32768 is not a weight.
+    #[error("weight {index} is −32768; weights are within ±32767")]
+    InvalidWeight {
+        /// Place of the weight.
+        index: usize,
+    },
+}
+
+impl Genome {
+    /// All weights zero.
+    #[must_use]
+    pub const fn zeroed(topology: Topology) -> Self {
+        Self {
+            topology,
+            weights: [0; MAX_WEIGHTS],
+        }
+    }
+
+    /// From weights in genome order.
+    ///
+    /// # Errors
+    /// [`GenomeError`] if their number is not the topology's or one of them is −32768.
+    pub fn from_weights(topology: Topology, weights: &[i16]) -> Result<Self, GenomeError> {
+        if weights.len() != topology.weights() {
+            return Err(GenomeError::WrongCount {
+                found: weights.len(),
+                expected: topology.weights(),
+            });
+        }
+        if let Some(index) = weights.iter().position(|&weight| weight == i16::MIN) {
+            return Err(GenomeError::InvalidWeight { index });
+        }
+        Ok(Self::from_iter(topology, weights.iter().copied()))
+    }
+
+    /// From weights that are known to be valid and as many as the topology has.
+    pub(crate) fn from_iter(topology: Topology, weights: impl Iterator<Item = i16>) -> Self {
+        let mut genome = Self::zeroed(topology);
+        for (to, from) in genome.weights_mut().zip(weights) {
+            *to = from;
+        }
+        genome
+    }
+
+    /// Weights uniform within ±[`INITIAL_WEIGHT_MAX_Q3_12`].
+    #[must_use]
+    pub fn random<R: Rng>(topology: Topology, rng: &mut R) -> Self {
+        let mut genome = Self::zeroed(topology);
+        for weight in genome.weights_mut() {
+            *weight = uniform_within(rng, INITIAL_WEIGHT_MAX_Q3_12);
+        }
+        genome
+    }
+
+    /// Each weight independently, with the given rate, gets an addend uniform within
+    /// ±[`MUTATION_MAX_Q3_12`]; the result saturates at ±32767.
+    pub fn mutate<R: Rng>(&mut self, rate: MutationRate, rng: &mut R) {
+        for weight in self.weights_mut() {
+            if u64::from(rng.next_u32()) < rate.per_2_32 {
+                let addend = uniform_within(rng, MUTATION_MAX_Q3_12);
+                let sum = weight.saturating_add(addend);
+                *weight = sum.max(-WEIGHT_MAX_Q3_12);
+            }
+        }
+    }
+
+    /// The topology.
+    #[must_use]
+    pub const fn topology(&self) -> Topology {
+        self.topology
+    }
+
+    /// All weights, Q3.12, in genome order.
+    #[must_use]
+    pub fn weights(&self) -> &[i16] {
+        self.weights
+            .get(..self.topology.weights())
+            .unwrap_or(&self.weights)
+    }
+
+    /// Weights of the action network.
+    #[must_use]
+    pub fn action_weights(&self) -> &[i16] {
+        let count = self.topology.action_weights();
+        self.weights.get(..count).unwrap_or(&self.weights)
+    }
+
+    /// Weights of the prediction network; empty if there is none.
+    #[must_use]
+    pub fn prediction_weights(&self) -> &[i16] {
+        let range = self.topology.action_weights()..self.topology.weights();
+        self.weights.get(range).unwrap_or(&[])
+    }
+
+    fn weights_mut(&mut self) -> impl Iterator<Item = &mut i16> {
+        self.weights.iter_mut().take(self.topology.weights())
+    }
+}
+
+/// Probability that a weight mutates, in units of 2⁻³².
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MutationRate {
+    per_2_32: u64,
+}
+
+impl MutationRate {
+    /// `numerator / denominator`, rounded down to a multiple of 2⁻³²; `None` beyond 1 or without a
+    /// denominator.
+    #[must_use]
+    pub const fn ratio(numerator: u32, denominator: u32) -> Option<Self> {
+        if denominator == 0 || numerator > denominator {
+            None
+        } else {
+            Some(Self {
+                per_2_32: ((numerator as u64) << 32) / denominator as u64,
+            })
+        }
+    }
+
+    /// `threshold / 2³²`; `None` beyond 1.
+    #[must_use]
+    pub const fn from_per_2_32(threshold: u64) -> Option<Self> {
+        if threshold > 1 << 32 {
+            None
+        } else {
+            Some(Self {
+                per_2_32: threshold,
+            })
+        }
+    }
+}
+
+/// Uniform in `-max..=max`: one word a draw, times the number of values, the upper half taken and
+/// the few words that would favour a value rejected (Lemire's method).
+fn uniform_within<R: Rng>(rng: &mut R, max: i16) -> i16 {
+    let values = 2 * max.unsigned_abs() as u32 + 1;
+    let rejected_below = values.wrapping_neg() % values;
+    loop {
+        let product = u64::from(rng.next_u32()) * u64::from(values);
+        if product as u32 >= rejected_below {
+            return ((product >> 32) as i32 - i32::from(max)) as i16;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use rand_chacha::ChaCha8Rng;
+    use rand_core::SeedableRng;
+    use std::vec::Vec;
+
+    fn rng() -> ChaCha8Rng {
+        ChaCha8Rng::seed_from_u64(2020)
+    }
+
+    #[test]
+    fn value_stability_random() {
+        let genome = Genome::random(Topology::default(), &mut rng());
+        assert_eq!(
+            genome.weights()[..6],
+            [-1243, -1748, 1797, 1017, -548, -866]
+        );
+    }
+
+    #[test]
+    fn value_stability_mutate() {
+        let mut genome = Genome::zeroed(Topology::default());
+        genome.mutate(MutationRate::ratio(1, 10).unwrap(), &mut rng());
+        let changed: Vec<_> = genome
+            .weights()
+            .iter()
+            .enumerate()
+            .filter(|(_, weight)| **weight != 0)
+            .map(|(index, weight)| (index, *weight))
+            .collect();
+        assert_eq!(changed[..3], [(1, 1437), (14, -1334), (46, 1625)]);
+    }
+
+    #[test]
+    fn initial_weights_reach_both_ends_and_nothing_beyond() {
+        let mut rng = rng();
+        let weights: Vec<i16> = (0..200)
+            .flat_map(|_| {
+                Genome::random(Topology::default(), &mut rng)
+                    .weights()
+                    .to_vec()
+            })
+            .collect();
+        assert_eq!(weights.iter().min(), Some(&-INITIAL_WEIGHT_MAX_Q3_12));
+        assert_eq!(weights.iter().max(), Some(&INITIAL_WEIGHT_MAX_Q3_12));
+        let mean = weights.iter().map(|&w| f64::from(w)).sum::<f64>() / weights.len() as f64;
+        assert!(mean.abs() < 15.0, "{mean}");
+    }
+
+    #[test]
+    fn mutation_changes_the_asked_share_and_saturates() {
+        let topology = Topology::default();
+        let rate = MutationRate::ratio(3, 10).unwrap();
+        let mut rng = rng();
+        let mut changed = 0;
+        for _ in 0..200 {
+            let mut genome = Genome::zeroed(topology);
+            genome.mutate(rate, &mut rng);
+            changed += genome.weights().iter().filter(|w| **w != 0).count();
+        }
+        let share = changed as f64 / (200.0 * 616.0);
+        assert!((share - 0.3).abs() < 0.01, "{share}");
+
+        for end in [32767, -32767] {
+            let mut genome = Genome::from_weights(topology, &[end; 616]).unwrap();
+            genome.mutate(MutationRate::ratio(1, 1).unwrap(), &mut rng);
+            assert!(genome.weights().contains(&end));
+            assert!(!genome.weights().contains(&i16::MIN));
+        }
+    }
+
+    #[test]
+    fn rates_of_zero_and_one_mutate_nothing_and_everything() {
+        let zeroed = Genome::zeroed(Topology::default());
+        let mut genome = zeroed.clone();
+        genome.mutate(MutationRate::ratio(0, 1).unwrap(), &mut rng());
+        assert_eq!(genome, zeroed);
+        genome.mutate(MutationRate::from_per_2_32(1 << 32).unwrap(), &mut rng());
+        assert!(genome.weights().iter().filter(|w| **w != 0).count() > 600);
+        assert_eq!(MutationRate::ratio(2, 1), None);
+        assert_eq!(MutationRate::ratio(0, 0), None);
+        assert_eq!(MutationRate::from_per_2_32((1 << 32) + 1), None);
+    }
+
+    #[test]
+    fn rejects_a_wrong_count_and_the_weight_minus_32768() {
+        let topology = Topology::default();
+        assert_eq!(
+            Genome::from_weights(topology, &[0; 615]),
+            Err(GenomeError::WrongCount {
+                found: 615,
+                expected: 616
+            })
+        );
+        let mut weights = [0; 616];
+        weights[9] = i16::MIN;
+        assert_eq!(
+            Genome::from_weights(topology, &weights),
+            Err(GenomeError::InvalidWeight { index: 9 })
+        );
+    }
+}

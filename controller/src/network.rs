@@ -1,0 +1,328 @@
+//! The three-layer networks: shape, weight order, and one forward pass.
+//!
+//! With `act` = [`activate`] and all values in Q3.12:
+//!
+//! - input neuron j: `u_j = act(w_j · x_j − θ_j)`, x_j a bit. It has two values, worked out once;
+//! - hidden neuron i: `h_i = act(Σ_j W_ij · u_j + r_i · h_i(t−1))`, the last term in the
+//!   prediction network only (paper, Fig. 1b);
+//! - output neuron k: the sign of the exact sum `Σ_i V_ki · h_i`.
+//!
+//! Genome order of the weights: `w₀, θ₀, w₁, θ₁, …`; hidden rows, each with its self-loop last if
+//! it has one; output rows.
+
+use crate::activation::activate;
+use crate::fixed::{FRACTION_BITS, MAX_TERMS, ONE_Q3_12, ROUNDING_Q24, saturate, sum_to_q3_12};
+
+/// Most inputs of a network: 14 sensors and the action value.
+pub const MAX_INPUTS: usize = 15;
+/// Most hidden neurons of a network.
+pub const MAX_HIDDEN: usize = 14;
+/// Most outputs of a network.
+pub const MAX_OUTPUTS: usize = 14;
+/// Place of the self-loop among a hidden neuron's terms.
+pub const SELF_LOOP: usize = MAX_TERMS - 1;
+
+/// Sizes of a network. The last input is the action value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Shape {
+    inputs: u8,
+    hidden: u8,
+    outputs: u8,
+    recurrent: bool,
+}
+
+/// A network of these sizes cannot be built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ShapeError {
+    /// A sum would have more terms than are exact in `i32`.
+    #[error("a sum of {terms} terms; at most {MAX_TERMS} are exact")]
+    TooManyTerms {
+        /// Terms of the longest sum.
+        terms: usize,
+    },
+    /// A layer is empty, or larger than the memory set aside for it.
+    #[error(
+        "{inputs}-{hidden}-{outputs} does not fit 1..={MAX_INPUTS} inputs, \
+         1..={MAX_HIDDEN} hidden and 1..={MAX_OUTPUTS} output neurons"
+    )]
+    DoesNotFit {
+        /// Inputs asked for.
+        inputs: usize,
+        /// Hidden neurons asked for.
+        hidden: usize,
+        /// Outputs asked for.
+        outputs: usize,
+    },
+}
+
+impl Shape {
+    /// Checks that every sum stays exact and every layer fits.
+    ///
+    /// # Errors
+    /// [`ShapeError`] names the sizes that do not fit.
+    pub const fn new(
+        inputs: usize,
+        hidden: usize,
+        outputs: usize,
+        recurrent: bool,
+    ) -> Result<Self, ShapeError> {
+        let input_terms = inputs + recurrent as usize;
+        let terms = if input_terms > hidden {
+            input_terms
+        } else {
+            hidden
+        };
+        if terms > MAX_TERMS {
+            return Err(ShapeError::TooManyTerms { terms });
+        }
+        if inputs == 0
+            || inputs > MAX_INPUTS
+            || hidden == 0
+            || hidden > MAX_HIDDEN
+            || outputs == 0
+            || outputs > MAX_OUTPUTS
+        {
+            return Err(ShapeError::DoesNotFit {
+                inputs,
+                hidden,
+                outputs,
+            });
+        }
+        Ok(Self {
+            inputs: inputs as u8,
+            hidden: hidden as u8,
+            outputs: outputs as u8,
+            recurrent,
+        })
+    }
+
+    /// [`Shape::new`] for constants: a shape that cannot be built does not compile.
+    pub(crate) const fn checked(
+        inputs: usize,
+        hidden: usize,
+        outputs: usize,
+        recurrent: bool,
+    ) -> Self {
+        match Self::new(inputs, hidden, outputs, recurrent) {
+            Ok(shape) => shape,
+            Err(_) => panic!("a network of this shape cannot be built"),
+        }
+    }
+
+    /// Inputs, the action value included.
+    #[must_use]
+    pub const fn inputs(self) -> usize {
+        self.inputs as usize
+    }
+
+    /// Hidden neurons.
+    #[must_use]
+    pub const fn hidden(self) -> usize {
+        self.hidden as usize
+    }
+
+    /// Output neurons.
+    #[must_use]
+    pub const fn outputs(self) -> usize {
+        self.outputs as usize
+    }
+
+    /// Whether every hidden neuron has a self-loop.
+    #[must_use]
+    pub const fn recurrent(self) -> bool {
+        self.recurrent
+    }
+
+    /// Weights of one hidden neuron.
+    #[must_use]
+    pub const fn hidden_row(self) -> usize {
+        self.inputs() + self.recurrent as usize
+    }
+
+    /// Weights of the whole network.
+    #[must_use]
+    pub const fn weights(self) -> usize {
+        2 * self.inputs() + self.hidden() * self.hidden_row() + self.outputs() * self.hidden()
+    }
+}
+
+/// A network with room for `H` hidden neurons and `O` outputs; what the shape does not use is zero
+/// and adds nothing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Network<const H: usize, const O: usize> {
+    shape: Shape,
+    /// Activation of each input neuron for a bit of 0 and of 1.
+    input: [[i16; 2]; MAX_INPUTS],
+    /// Inputs' weights from 0 on, the self-loop at [`SELF_LOOP`].
+    hidden: [[i16; MAX_TERMS]; H],
+    output: [[i16; H]; O],
+}
+
+/// The action network of any topology.
+pub type ActionNetwork = Network<8, 2>;
+/// The prediction network of any topology.
+pub type PredictionNetwork = Network<MAX_HIDDEN, MAX_OUTPUTS>;
+
+impl<const H: usize, const O: usize> Network<H, O> {
+    const TERMS_ARE_EXACT: () = assert!(H <= MAX_TERMS && O <= 16, "more than 16 terms in a sum");
+
+    /// Takes the shape's weights, in genome order, from `weights`; weights that it does not
+    /// deliver are zero, those beyond the shape stay in it. Neurons beyond `H` and `O` are left out.
+    pub(crate) fn from_weights(shape: Shape, weights: &mut impl Iterator<Item = i16>) -> Self {
+        let () = Self::TERMS_ARE_EXACT;
+        let mut network = Self {
+            shape,
+            input: [[0; 2]; MAX_INPUTS],
+            hidden: [[0; MAX_TERMS]; H],
+            output: [[0; H]; O],
+        };
+        for levels in network.input.iter_mut().take(shape.inputs()) {
+            let weight = i32::from(weights.next().unwrap_or(0));
+            let threshold = i32::from(weights.next().unwrap_or(0));
+            *levels = [
+                activate(saturate(-threshold)),
+                activate(saturate(weight - threshold)),
+            ];
+        }
+        for row in network.hidden.iter_mut().take(shape.hidden()) {
+            for weight in row.iter_mut().take(shape.inputs()) {
+                *weight = weights.next().unwrap_or(0);
+            }
+            if shape.recurrent() {
+                row[SELF_LOOP] = weights.next().unwrap_or(0);
+            }
+        }
+        for row in network.output.iter_mut().take(shape.outputs()) {
+            for weight in row.iter_mut().take(shape.hidden()) {
+                *weight = weights.next().unwrap_or(0);
+            }
+        }
+        network
+    }
+
+    /// The network's sizes.
+    #[must_use]
+    pub fn shape(&self) -> Shape {
+        self.shape
+    }
+
+    /// Activations (Q3.12) of each input neuron for a bit of 0 and of 1; zero beyond the shape.
+    #[must_use]
+    pub fn input_levels(&self) -> &[[i16; 2]; MAX_INPUTS] {
+        &self.input
+    }
+
+    /// Hidden weights (Q3.12): a row a neuron, the self-loop at [`SELF_LOOP`]; zero beyond the
+    /// shape.
+    #[must_use]
+    pub fn hidden_rows(&self) -> &[[i16; MAX_TERMS]; H] {
+        &self.hidden
+    }
+
+    /// Output weights (Q3.12): a row an output; zero beyond the shape.
+    #[must_use]
+    pub fn output_rows(&self) -> &[[i16; H]; O] {
+        &self.output
+    }
+
+    /// One forward pass: bit j of `inputs` is input j, bit k of the result is set where output k
+    /// is not negative. `hidden` holds the last hidden activations and receives the new ones;
+    /// without self-loops only the latter.
+    #[inline]
+    pub(crate) fn forward(&self, inputs: u32, hidden: &mut [i16; H]) -> u16 {
+        let mut terms = [0; MAX_TERMS];
+        for (index, (term, levels)) in terms.iter_mut().zip(&self.input).enumerate() {
+            *term = levels[(inputs >> index & 1) as usize];
+        }
+        for (row, value) in self.hidden.iter().zip(hidden.iter_mut()) {
+            terms[SELF_LOOP] = *value;
+            *value = activate(sum_to_q3_12(ROUNDING_Q24 + dot(row, &terms)));
+        }
+        let mut outputs = 0;
+        for (index, row) in self.output.iter().enumerate().take(self.shape.outputs()) {
+            outputs |= u16::from(dot(row, hidden) >= 0) << index;
+        }
+        outputs
+    }
+}
+
+/// Exact sum of products, Q24. Callers have at most [`MAX_TERMS`] terms, one factor of each within
+/// ±[`ONE_Q3_12`].
+#[inline]
+fn dot<const N: usize>(weights: &[i16; N], values: &[i16; N]) -> i32 {
+    let mut sum = 0;
+    for (&weight, &value) in weights.iter().zip(values) {
+        sum += i32::from(weight) * i32::from(value);
+    }
+    sum
+}
+
+const _: () = assert!(ONE_Q3_12 as i32 == 1 << FRACTION_BITS);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_than_sixteen_terms_cannot_be_built() {
+        assert!(Shape::new(15, 14, 14, true).is_ok());
+        assert_eq!(
+            Shape::new(16, 8, 2, true),
+            Err(ShapeError::TooManyTerms { terms: 17 })
+        );
+        assert_eq!(
+            Shape::new(15, 17, 2, false),
+            Err(ShapeError::TooManyTerms { terms: 17 })
+        );
+        assert!(matches!(
+            Shape::new(16, 8, 2, false),
+            Err(ShapeError::DoesNotFit { .. })
+        ));
+        assert!(matches!(
+            Shape::new(0, 8, 2, false),
+            Err(ShapeError::DoesNotFit { .. })
+        ));
+    }
+
+    #[test]
+    fn a_pass_worked_out_by_hand() {
+        // One input (w = 1, θ = 0.5), one hidden neuron (W = 2, r = −1), one output (V = 1).
+        let shape = Shape::new(1, 1, 1, true).unwrap();
+        let mut weights = [4096, 2048, 8192, -4096, 4096].into_iter();
+        let network = Network::<1, 1>::from_weights(shape, &mut weights);
+        let u1 = activate(2048);
+        assert_eq!(network.input_levels()[0], [-u1, u1]);
+
+        let mut hidden = [0];
+        assert_eq!(network.forward(1, &mut hidden), 1);
+        let first = activate(((8192 * i32::from(u1) + 2048) >> 12) as i16);
+        assert_eq!(hidden, [first]);
+
+        assert_eq!(network.forward(0, &mut hidden), 0);
+        let sum = -8192 * i32::from(u1) - 4096 * i32::from(first);
+        assert_eq!(hidden, [activate(((sum + 2048) >> 12) as i16)]);
+    }
+
+    #[test]
+    fn an_output_of_exactly_zero_counts_as_not_negative() {
+        let shape = Shape::new(1, 1, 1, false).unwrap();
+        let network = Network::<1, 1>::from_weights(shape, &mut core::iter::empty());
+        assert_eq!(network.forward(0, &mut [0]), 1);
+    }
+
+    #[test]
+    fn the_largest_sums_are_exact() {
+        let shape = Shape::new(15, 14, 14, true).unwrap();
+        for weight in [32767, -32767] {
+            let network: PredictionNetwork =
+                Network::from_weights(shape, &mut core::iter::repeat(weight));
+            let mut hidden = [4096; MAX_HIDDEN];
+            network.forward(0x7fff, &mut hidden);
+            let mut hidden = [-4096; MAX_HIDDEN];
+            network.forward(0, &mut hidden);
+        }
+    }
+}

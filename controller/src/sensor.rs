@@ -1,0 +1,153 @@
+//! Sensor models: which cells around a robot it senses, one bit a cell.
+//!
+//! [`SensorModel::cells`] is the one definition of the cells, for the simulator and the robot.
+
+use serde::{Deserialize, Serialize};
+
+/// Most sensors of any model (C).
+pub const MAX_SENSORS: usize = 14;
+
+/// A cell relative to a robot: steps ahead (negative: behind) and to the left (negative: right).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Cell {
+    /// Cells ahead of the robot, along its heading.
+    pub ahead: i8,
+    /// Cells to the left of the robot.
+    pub left: i8,
+}
+
+/// Shorthand for the tables below.
+const fn cell(ahead: i8, left: i8) -> Cell {
+    Cell { ahead, left }
+}
+
+/// Cells of model A: the Moore neighbourhood.
+static CELLS_A: [Cell; 8] = [
+    cell(1, 0),
+    cell(1, -1),
+    cell(1, 1),
+    cell(0, -1),
+    cell(0, 1),
+    cell(-1, 0),
+    cell(-1, -1),
+    cell(-1, 1),
+];
+
+/// Cells of model C; those of model B are its first six.
+static CELLS_C: [Cell; 14] = [
+    cell(1, 0),
+    cell(1, -1),
+    cell(1, 1),
+    cell(2, 0),
+    cell(2, -1),
+    cell(2, 1),
+    cell(0, -1),
+    cell(0, 1),
+    cell(-1, 0),
+    cell(-1, -1),
+    cell(-1, 1),
+    cell(-2, 0),
+    cell(-2, -1),
+    cell(-2, 1),
+];
+
+/// The three sensor models of the paper (Sec. 2.1, Fig. 3).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SensorModel {
+    /// Eight cells: the Moore neighbourhood.
+    A,
+    /// Six cells: two rows of three ahead.
+    B,
+    /// Fourteen cells: two rows of three ahead, two behind, and the cells left and right.
+    #[default]
+    C,
+}
+
+impl SensorModel {
+    /// Every model, in order.
+    pub const ALL: [Self; 3] = [Self::A, Self::B, Self::C];
+
+    /// The sensed cells, in the order of the sensor bits.
+    #[must_use]
+    pub const fn cells(self) -> &'static [Cell] {
+        match self {
+            Self::A => &CELLS_A,
+            Self::B => CELLS_C.split_at(6).0,
+            Self::C => &CELLS_C,
+        }
+    }
+
+    /// Number of sensors: 8, 6 or 14.
+    #[must_use]
+    pub const fn sensors(self) -> usize {
+        self.cells().len()
+    }
+
+    /// A one in the place of every sensor of the model.
+    #[must_use]
+    pub const fn mask(self) -> SensorBits {
+        SensorBits((1 << self.sensors()) - 1)
+    }
+}
+
+/// One bit a sensor: bit k is sensor k, 1 means occupied.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SensorBits(u16);
+
+impl SensorBits {
+    /// No sensor reads occupied.
+    pub const NONE: Self = Self(0);
+
+    /// From the raw bits. Bits beyond a model's sensors are ignored by the controller.
+    #[must_use]
+    pub const fn new(bits: u16) -> Self {
+        Self(bits)
+    }
+
+    /// The raw bits.
+    #[must_use]
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    /// Whether sensor `index` reads occupied; false for an index beyond 15.
+    #[must_use]
+    pub const fn get(self, index: usize) -> bool {
+        index < 16 && self.0 >> index & 1 == 1
+    }
+
+    /// Number of sensors that differ.
+    #[must_use]
+    pub const fn differing(self, other: Self) -> u32 {
+        (self.0 ^ other.0).count_ones()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cells_of_a_model_are_distinct_and_not_the_robots_own() {
+        for model in SensorModel::ALL {
+            let cells = model.cells();
+            for (index, cell) in cells.iter().enumerate() {
+                assert!(!cells[..index].contains(cell), "{model:?} {cell:?}");
+                assert!(cell.ahead != 0 || cell.left != 0);
+                assert!(cell.ahead.abs() <= 2 && cell.left.abs() <= 1);
+            }
+        }
+    }
+
+    #[test]
+    fn models_have_8_6_and_14_sensors() {
+        assert_eq!(SensorModel::ALL.map(SensorModel::sensors), [8, 6, 14]);
+        assert_eq!(
+            SensorModel::ALL.map(|model| model.mask().bits()),
+            [0xff, 0x3f, 0x3fff]
+        );
+    }
+}

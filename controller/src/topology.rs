@@ -1,0 +1,318 @@
+//! Topologies: which networks a genome describes, and which predictions it leaves to them.
+
+use crate::network::Shape;
+use crate::sensor::{SensorBits, SensorModel};
+use serde::{Deserialize, Serialize};
+
+/// Structure whose local picture serves as a predefined prediction (paper, Sec. 3.3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Template {
+    /// Robots ahead and behind (as far as the model senses).
+    Line,
+    /// One robot, right ahead.
+    Pair,
+    /// Robots two cells ahead and behind; model C only.
+    Square,
+    /// Robots on the four diagonals and two cells ahead and behind; model C only.
+    TriangularLattice,
+}
+
+impl Template {
+    /// Every template, in order.
+    pub const ALL: [Self; 4] = [
+        Self::Line,
+        Self::Pair,
+        Self::Square,
+        Self::TriangularLattice,
+    ];
+
+    /// The name used in files and on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Line => "line",
+            Self::Pair => "pair",
+            Self::Square => "square",
+            Self::TriangularLattice => "triangular-lattice",
+        }
+    }
+
+    /// The sensors that the template predicts occupied, if it exists for the model.
+    #[must_use]
+    pub const fn bits(self, model: SensorModel) -> Option<SensorBits> {
+        Some(SensorBits::new(match (self, model) {
+            (Self::Line, SensorModel::A) => bits_at(&[0, 5]),
+            (Self::Line, SensorModel::B) => bits_at(&[0, 3]),
+            (Self::Line, SensorModel::C) => LINE_C,
+            (Self::Pair, _) => bits_at(&[0]),
+            (Self::Square, SensorModel::C) => bits_at(&[3, 11]),
+            (Self::TriangularLattice, SensorModel::C) => bits_at(&[1, 2, 3, 9, 10, 11]),
+            (Self::Square | Self::TriangularLattice, _) => return None,
+        }))
+    }
+}
+
+/// The line sensors of model C.
+const LINE_C: u16 = bits_at(&[0, 3, 8, 11]);
+
+/// A word with ones at the given sensors.
+const fn bits_at(sensors: &[u8]) -> u16 {
+    let mut bits = 0;
+    let mut index = 0;
+    while index < sensors.len() {
+        bits |= 1 << sensors[index];
+        index += 1;
+    }
+    bits
+}
+
+/// Which predictions are the network's, and which are fixed in advance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Prediction {
+    /// The network predicts every sensor.
+    #[default]
+    Free,
+    /// The sensors that the template sets are always predicted occupied, the network predicts the
+    /// others. Exists for the line on model C.
+    PartlyPredefined(Template),
+    /// Every sensor is always predicted as the template says; there is no prediction network.
+    Predefined(Template),
+}
+
+/// A combination of sensor model and predictions that exists.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Topology {
+    model: SensorModel,
+    prediction: Prediction,
+}
+
+/// The combination of sensor model and template does not exist.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum TopologyError {
+    /// Squares and triangular lattices need model C.
+    #[error("the template {} does not exist for sensor model {model:?}", template.name())]
+    NoSuchTemplate {
+        /// The template asked for.
+        template: Template,
+        /// The sensor model asked for.
+        model: SensorModel,
+    },
+    /// Partly predefined predictions exist for the line on model C.
+    #[error("partly predefined predictions exist for the line on sensor model C only, not for the {} on {model:?}", template.name())]
+    NotPartly {
+        /// The template asked for.
+        template: Template,
+        /// The sensor model asked for.
+        model: SensorModel,
+    },
+}
+
+impl Topology {
+    /// Every topology that exists.
+    pub const ALL: [Self; 12] = {
+        use Prediction::{Free, PartlyPredefined, Predefined};
+        use SensorModel::{A, B, C};
+        use Template::{Line, Pair, Square, TriangularLattice};
+        const fn of(model: SensorModel, prediction: Prediction) -> Topology {
+            Topology { model, prediction }
+        }
+        [
+            of(A, Free),
+            of(A, Predefined(Line)),
+            of(A, Predefined(Pair)),
+            of(B, Free),
+            of(B, Predefined(Line)),
+            of(B, Predefined(Pair)),
+            of(C, Free),
+            of(C, PartlyPredefined(Line)),
+            of(C, Predefined(Line)),
+            of(C, Predefined(Pair)),
+            of(C, Predefined(Square)),
+            of(C, Predefined(TriangularLattice)),
+        ]
+    };
+
+    /// Checks that the combination exists.
+    ///
+    /// # Errors
+    /// [`TopologyError`] names the template and the model that do not go together.
+    pub const fn new(model: SensorModel, prediction: Prediction) -> Result<Self, TopologyError> {
+        match prediction {
+            Prediction::PartlyPredefined(template)
+                if !matches!((template, model), (Template::Line, SensorModel::C)) =>
+            {
+                Err(TopologyError::NotPartly { template, model })
+            }
+            Prediction::Predefined(template) if template.bits(model).is_none() => {
+                Err(TopologyError::NoSuchTemplate { template, model })
+            }
+            _ => Ok(Self { model, prediction }),
+        }
+    }
+
+    /// The sensor model.
+    #[must_use]
+    pub const fn model(self) -> SensorModel {
+        self.model
+    }
+
+    /// Which predictions are fixed.
+    #[must_use]
+    pub const fn prediction(self) -> Prediction {
+        self.prediction
+    }
+
+    /// Number of sensors.
+    #[must_use]
+    pub const fn sensors(self) -> usize {
+        self.model.sensors()
+    }
+
+    /// A one for every sensor that the prediction network predicts.
+    #[must_use]
+    pub const fn predicted(self) -> SensorBits {
+        let all = self.model.mask().bits();
+        SensorBits::new(match self.prediction {
+            Prediction::Free => all,
+            Prediction::PartlyPredefined(_) => all & !self.fixed().bits(),
+            Prediction::Predefined(_) => 0,
+        })
+    }
+
+    /// The fixed predictions, zero where there is none; what a robot predicts for its first
+    /// reading.
+    #[must_use]
+    pub const fn fixed(self) -> SensorBits {
+        match self.prediction {
+            Prediction::Free => SensorBits::NONE,
+            Prediction::PartlyPredefined(template) | Prediction::Predefined(template) => {
+                match template.bits(self.model) {
+                    Some(bits) => bits,
+                    None => SensorBits::NONE,
+                }
+            }
+        }
+    }
+
+    /// Shape of the action network.
+    #[must_use]
+    pub const fn action_shape(self) -> Shape {
+        match self.model {
+            SensorModel::A => const { Shape::checked(9, 6, 2, false) },
+            SensorModel::B => const { Shape::checked(7, 4, 2, false) },
+            SensorModel::C => const { Shape::checked(15, 8, 2, false) },
+        }
+    }
+
+    /// Shape of the prediction network, if there is one.
+    #[must_use]
+    pub const fn prediction_shape(self) -> Option<Shape> {
+        match (self.prediction, self.model) {
+            (Prediction::Predefined(_), _) => None,
+            (Prediction::PartlyPredefined(_), _) => {
+                Some(const { Shape::checked(15, 12, 10, true) })
+            }
+            (Prediction::Free, SensorModel::A) => Some(const { Shape::checked(9, 8, 8, true) }),
+            (Prediction::Free, SensorModel::B) => Some(const { Shape::checked(7, 6, 6, true) }),
+            (Prediction::Free, SensorModel::C) => Some(const { Shape::checked(15, 14, 14, true) }),
+        }
+    }
+
+    /// Number of weights of the action network.
+    #[must_use]
+    pub const fn action_weights(self) -> usize {
+        self.action_shape().weights()
+    }
+
+    /// Number of weights of the prediction network; 0 if there is none.
+    #[must_use]
+    pub const fn prediction_weights(self) -> usize {
+        match self.prediction_shape() {
+            Some(shape) => shape.weights(),
+            None => 0,
+        }
+    }
+
+    /// Number of weights of a genome.
+    #[must_use]
+    pub const fn weights(self) -> usize {
+        self.action_weights() + self.prediction_weights()
+    }
+}
+
+/// Most weights of any genome: 166 of the action network and 450 of the prediction network.
+pub const MAX_WEIGHTS: usize = {
+    let mut most = 0;
+    let mut index = 0;
+    while index < Topology::ALL.len() {
+        let weights = Topology::ALL[index].weights();
+        if weights > most {
+            most = weights;
+        }
+        index += 1;
+    }
+    most
+};
+
+const _: () = assert!(MAX_WEIGHTS == 616);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_combination_either_exists_and_is_listed_or_is_refused() {
+        let mut accepted = 0;
+        for model in SensorModel::ALL {
+            let predictions = Template::ALL
+                .into_iter()
+                .flat_map(|template| {
+                    [
+                        Prediction::PartlyPredefined(template),
+                        Prediction::Predefined(template),
+                    ]
+                })
+                .chain([Prediction::Free]);
+            for prediction in predictions {
+                if let Ok(topology) = Topology::new(model, prediction) {
+                    assert!(Topology::ALL.contains(&topology), "{topology:?}");
+                    accepted += 1;
+                }
+            }
+        }
+        assert_eq!(accepted, Topology::ALL.len());
+    }
+
+    #[test]
+    fn networks_have_the_papers_sizes() {
+        let sizes = |model, prediction| {
+            let topology = Topology::new(model, prediction).unwrap();
+            (topology.action_weights(), topology.prediction_weights())
+        };
+        assert_eq!(sizes(SensorModel::A, Prediction::Free), (84, 162));
+        assert_eq!(sizes(SensorModel::B, Prediction::Free), (50, 98));
+        assert_eq!(sizes(SensorModel::C, Prediction::Free), (166, 450));
+        assert_eq!(
+            sizes(SensorModel::C, Prediction::PartlyPredefined(Template::Line)),
+            (166, 342)
+        );
+        assert_eq!(
+            sizes(SensorModel::C, Prediction::Predefined(Template::Pair)),
+            (166, 0)
+        );
+    }
+
+    #[test]
+    fn the_partly_predefined_line_leaves_ten_sensors_to_the_network() {
+        let topology =
+            Topology::new(SensorModel::C, Prediction::PartlyPredefined(Template::Line)).unwrap();
+        let left: std::vec::Vec<usize> = (0..14).filter(|&k| topology.predicted().get(k)).collect();
+        assert_eq!(left, [1, 2, 4, 5, 6, 7, 9, 10, 12, 13]);
+    }
+
+    extern crate std;
+}

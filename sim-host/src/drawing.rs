@@ -1,0 +1,120 @@
+//! Swarms as text: one character a cell, north at the top.
+
+use crate::torus::{Grid, Heading, Pose};
+
+/// The arrow of a heading.
+#[must_use]
+pub fn arrow(heading: Heading) -> char {
+    match heading {
+        Heading::East => '▶',
+        Heading::North => '▲',
+        Heading::West => '◀',
+        Heading::South => '▼',
+    }
+}
+
+/// An empty cell.
+pub const EMPTY: char = '·';
+
+/// Draws a swarm, one line a row, the northernmost first.
+#[must_use]
+pub fn draw(grid: Grid, poses: &[Pose]) -> String {
+    let width = usize::from(grid.width());
+    let mut cells = vec![EMPTY; grid.cells() as usize];
+    for pose in poses {
+        cells[grid.cell(pose.x, pose.y) as usize] = arrow(pose.heading);
+    }
+    let rows: Vec<String> = cells.chunks(width).rev().map(String::from_iter).collect();
+    rows.join("\n")
+}
+
+/// A drawing does not describe a swarm.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DrawingError {
+    /// Rows of different lengths.
+    #[error("row {row} has {found} cells, the first row {expected}")]
+    UnevenRows {
+        /// The row, the northernmost being 0.
+        row: usize,
+        /// Its cells.
+        found: usize,
+        /// Cells of the first row.
+        expected: usize,
+    },
+    /// A character that is neither an arrow nor an empty cell.
+    #[error("{found:?} in row {row}; cells are ▶ ▲ ◀ ▼ or ·")]
+    UnknownCharacter {
+        /// The row, the northernmost being 0.
+        row: usize,
+        /// The character.
+        found: char,
+    },
+    /// The drawing is too small or too large for a grid.
+    #[error(transparent)]
+    Grid(#[from] crate::torus::GridError),
+}
+
+/// Reads a drawing back: the grid, and the poses row by row from the south, each from the west.
+/// White space around rows and empty lines are skipped.
+///
+/// # Errors
+/// [`DrawingError`] says which row is wrong.
+pub fn parse(drawing: &str) -> Result<(Grid, Vec<Pose>), DrawingError> {
+    let rows: Vec<Vec<char>> = drawing
+        .lines()
+        .map(|line| line.trim().chars().collect::<Vec<_>>())
+        .filter(|row| !row.is_empty())
+        .collect();
+    let width = rows.first().map_or(0, Vec::len);
+    let grid = Grid::new(width as u32, rows.len() as u32)?;
+    let mut poses = Vec::new();
+    for (y, (row, cells)) in rows.iter().enumerate().rev().enumerate() {
+        if cells.len() != width {
+            return Err(DrawingError::UnevenRows {
+                row,
+                found: cells.len(),
+                expected: width,
+            });
+        }
+        for (x, &cell) in cells.iter().enumerate() {
+            let heading = Heading::ALL.into_iter().find(|&h| arrow(h) == cell);
+            match heading {
+                Some(heading) => poses.push(Pose {
+                    x: x as u16,
+                    y: y as u16,
+                    heading,
+                }),
+                None if cell == EMPTY => {}
+                None => return Err(DrawingError::UnknownCharacter { row, found: cell }),
+            }
+        }
+    }
+    Ok((grid, poses))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drawing_is_read_back_as_it_was_drawn() {
+        let drawing = "▶··\n·▲◀\n··▼\n···";
+        let (grid, poses) = parse(drawing).unwrap();
+        assert_eq!((grid.width(), grid.height()), (3, 4));
+        assert_eq!((poses[0].x, poses[0].y), (2, 1));
+        assert_eq!(draw(grid, &poses), drawing);
+    }
+
+    #[test]
+    fn uneven_rows_unknown_characters_and_small_grids_are_refused() {
+        assert!(matches!(
+            parse("···\n··\n···"),
+            Err(DrawingError::UnevenRows { row: 1, .. })
+        ));
+        assert!(matches!(
+            parse("···\n·x·\n···"),
+            Err(DrawingError::UnknownCharacter { row: 1, found: 'x' })
+        ));
+        assert!(matches!(parse(""), Err(DrawingError::Grid(_))));
+    }
+}

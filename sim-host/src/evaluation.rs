@@ -1,0 +1,124 @@
+//! Evaluation: how well a swarm predicts, over one run and over the repetitions of a generation.
+//!
+//! Fitness (paper, Eq. 1) is held as the integer number of matches: bits that were as predicted
+//! one step before. A genome's fitness is the smallest over its repetitions.
+
+use crate::scenario::{Scenario, Trial};
+use crate::torus::Pose;
+use crate::world::{World, WorldError};
+use minimal_surprise_controller::sensor::MAX_SENSORS;
+use minimal_surprise_controller::{Controller, Genome};
+
+/// A genome's fitness.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Evaluation {
+    /// Matches of the worst repetition.
+    pub matches: u64,
+    /// The worst repetition; of equals, the first.
+    pub worst_repetition: u32,
+}
+
+/// What one run came to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Outcome {
+    /// Bits that were as predicted.
+    pub matches: u64,
+    /// Bits sensed.
+    pub scored_bits: u64,
+    /// How often each sensor was predicted occupied, in the predictions so scored.
+    pub predicted_occupied: Vec<u64>,
+    /// Poses at the end.
+    pub final_poses: Vec<Pose>,
+}
+
+impl Outcome {
+    /// Fitness F of Eq. 1, 0 to 1.
+    #[must_use]
+    pub fn fitness(&self) -> f64 {
+        self.matches as f64 / self.scored_bits as f64
+    }
+
+    /// Average prediction per sensor (paper, Fig. 9), 0 to 1: mean over robots and steps of the
+    /// predictions that were scored.
+    #[must_use]
+    pub fn average_prediction(&self) -> Vec<f64> {
+        let sensors = self.predicted_occupied.len() as f64;
+        let readings = self.scored_bits as f64 / sensors;
+        self.predicted_occupied
+            .iter()
+            .map(|&count| count as f64 / readings)
+            .collect()
+    }
+}
+
+/// Runs a genome from a trial's start for the scenario's steps, showing every step to `observe`.
+///
+/// # Errors
+/// [`WorldError`] if the trial's poses do not fit the grid.
+pub fn run(
+    controller: &Controller,
+    scenario: &Scenario,
+    trial: &Trial,
+    mut observe: impl FnMut(&World),
+) -> Result<Outcome, WorldError> {
+    let mut world = World::new(scenario.grid(), &trial.starts, controller)?;
+    let mut noise = trial.noise.clone();
+    let mut occupied = [0_u64; MAX_SENSORS];
+    for _ in 0..scenario.steps() {
+        for state in world.states() {
+            let prediction = state.prediction();
+            for (sensor, count) in occupied.iter_mut().enumerate() {
+                *count += u64::from(prediction.get(sensor));
+            }
+        }
+        world.step(controller, &mut noise);
+        observe(&world);
+    }
+    let (matches, scored_bits) = matches_of(&world);
+    Ok(Outcome {
+        matches,
+        scored_bits,
+        predicted_occupied: occupied[..controller.topology().sensors()].to_vec(),
+        final_poses: world.poses().to_vec(),
+    })
+}
+
+/// A genome's fitness over all trials.
+///
+/// # Panics
+/// If there is no trial, or a trial's poses do not fit the grid.
+#[must_use]
+pub fn evaluate(genome: &Genome, scenario: &Scenario, trials: &[Trial]) -> Evaluation {
+    let controller = Controller::new(genome);
+    let matches = trials.iter().map(|trial| {
+        let mut world = World::new(scenario.grid(), &trial.starts, &controller)
+            .expect("trials are drawn on the scenario's grid");
+        let mut noise = trial.noise.clone();
+        for _ in 0..scenario.steps() {
+            world.step(&controller, &mut noise);
+        }
+        matches_of(&world).0
+    });
+    let (worst_repetition, matches) = (0..)
+        .zip(matches)
+        .min_by_key(|&(_, matches)| matches)
+        .expect("there is at least one trial");
+    Evaluation {
+        matches,
+        worst_repetition,
+    }
+}
+
+/// Matches and scored bits of the whole swarm so far.
+fn matches_of(world: &World) -> (u64, u64) {
+    world
+        .states()
+        .iter()
+        .fold((0, 0), |(matches, seen), state| {
+            let surprise = state.surprise();
+            (
+                matches + surprise.seen_bits - surprise.mispredicted_bits,
+                seen + surprise.seen_bits,
+            )
+        })
+}

@@ -1,0 +1,26 @@
+//! The torus grid world in which swarms of minimal-surprise robots live.
+//!
+//! Robots sense, decide by calling the controller crate, and act in index order. An evaluation is
+//! a pure function of genome, scenario and seed: no clock, no thread and no memory layout enters
+//! a result.
+//!
+//! Data flows one way: [`torus`] → [`seed`] → [`noise`] → [`world`] → [`scenario`] → [`evaluation`] →
+//! [`trace`].
+#![forbid(unsafe_code)]
+
+pub mod drawing;
+pub mod evaluation;
+pub mod noise;
+pub mod scenario;
+pub mod seed;
+pub mod torus;
+pub mod trace;
+pub mod world;
+
+pub use evaluation::{Evaluation, Outcome, evaluate, run};
+pub use noise::{NoiseRate, NoiseStream};
+pub use scenario::{Scenario, ScenarioError, Trial};
+pub use seed::{Purpose, SeedTree};
+pub use torus::{Grid, GridError, Heading, Pose};
+pub use trace::{Trace, TraceStep};
+pub use world::{World, WorldError};

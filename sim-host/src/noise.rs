@@ -1,0 +1,155 @@
+//! Sensor noise: every bit of every reading is flipped with the same probability, independently
+//! (paper, Sec. 3.5).
+//!
+//! The noise is counter-based: the flips of a robot in a step are a function of run seed,
+//! generation, repetition, step and robot. The ChaCha8 key names the first three (see
+//! [`seed`](crate::seed)), the ChaCha stream number is the step, and robot n's words start at word
+//! 8·n: sixteen draws of 16 bits, of which sensor k takes number k (low half of a word first) and
+//! flips where it is below the rate. So no engine, order or thread changes it, and all genomes of
+//! a generation meet the same noise.
+
+use crate::seed::Stream;
+use minimal_surprise_controller::SensorBits;
+use rand_core::Rng as _;
+
+/// Words of 32 bits that each robot has in each step.
+const WORDS_PER_ROBOT: u128 = 8;
+
+/// Probability that a bit is flipped, in units of 1/65,536.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NoiseRate {
+    per_65_536: u32,
+}
+
+impl NoiseRate {
+    /// No noise.
+    pub const NONE: Self = Self { per_65_536: 0 };
+
+    /// The nearest multiple of 1/65,536; `None` unless the probability is within 0 and 1.
+    #[must_use]
+    pub fn new(probability: f64) -> Option<Self> {
+        (0.0..=1.0).contains(&probability).then(|| Self {
+            per_65_536: (probability * 65_536.0).round() as u32,
+        })
+    }
+
+    /// The probability in units of 1/65,536.
+    #[must_use]
+    pub fn per_65_536(self) -> u32 {
+        self.per_65_536
+    }
+
+    /// Whether nothing is ever flipped.
+    #[must_use]
+    pub fn is_none(self) -> bool {
+        self.per_65_536 == 0
+    }
+}
+
+/// The noise of one repetition, shared by all genomes of a generation.
+#[derive(Clone, Debug)]
+pub struct NoiseStream {
+    stream: Stream,
+    rate: NoiseRate,
+}
+
+impl NoiseStream {
+    /// Noise of the given rate from a stream of the seed tree.
+    #[must_use]
+    pub fn new(stream: Stream, rate: NoiseRate) -> Self {
+        Self { stream, rate }
+    }
+
+    /// The rate.
+    #[must_use]
+    pub fn rate(&self) -> NoiseRate {
+        self.rate
+    }
+
+    /// Flips the readings of all robots in one step, robot 0 first.
+    pub fn flip(&mut self, step: u32, readings: &mut [SensorBits]) {
+        if self.rate.is_none() {
+            return;
+        }
+        self.stream.set_stream(step.into());
+        self.stream.set_word_pos(0);
+        for reading in readings {
+            *reading = SensorBits::new(reading.bits() ^ self.next_flips());
+        }
+    }
+
+    /// Flips of one robot in one step, as bits.
+    #[must_use]
+    pub fn flips(&mut self, step: u32, robot: u32) -> u16 {
+        self.stream.set_stream(step.into());
+        self.stream
+            .set_word_pos(u128::from(robot) * WORDS_PER_ROBOT);
+        self.next_flips()
+    }
+
+    fn next_flips(&mut self) -> u16 {
+        let mut flips = 0;
+        for pair in 0..WORDS_PER_ROBOT {
+            let word = self.stream.next_u32();
+            let low = u16::from(word & 0xffff < self.rate.per_65_536);
+            let high = u16::from(word >> 16 < self.rate.per_65_536);
+            flips |= (low | high << 1) << (2 * pair);
+        }
+        flips
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seed::{Purpose, SeedTree};
+
+    fn noise(probability: f64) -> NoiseStream {
+        let stream = SeedTree::new(11).stream(Purpose::Noise, 2, 3);
+        NoiseStream::new(stream, NoiseRate::new(probability).unwrap())
+    }
+
+    #[test]
+    fn value_stability_flips() {
+        assert_eq!(noise(0.5).flips(4, 5), 613);
+    }
+
+    #[test]
+    fn flips_do_not_depend_on_the_order_of_asking() {
+        let mut readings = [SensorBits::NONE; 37];
+        noise(0.3).flip(9, &mut readings);
+        let mut other = noise(0.3);
+        for robot in (0..37_u32).rev() {
+            assert_eq!(other.flips(9, robot), readings[robot as usize].bits());
+        }
+    }
+
+    #[test]
+    fn the_share_of_flipped_bits_is_the_rate() {
+        for probability in [0.05, 0.1, 0.15, 0.5] {
+            let mut noise = noise(probability);
+            let mut readings = vec![SensorBits::NONE; 10_000];
+            noise.flip(0, &mut readings);
+            let flipped: u32 = readings.iter().map(|r| r.bits().count_ones()).sum();
+            let share = f64::from(flipped) / 160_000.0;
+            assert!((share - probability).abs() < 0.005, "{share}");
+        }
+    }
+
+    #[test]
+    fn rates_of_zero_and_one_flip_nothing_and_everything() {
+        assert_eq!(noise(0.0).flips(0, 0), 0);
+        assert_eq!(noise(1.0).flips(0, 0), 0xffff);
+        let mut readings = [SensorBits::new(5)];
+        noise(0.0).flip(0, &mut readings);
+        assert_eq!(readings[0].bits(), 5);
+    }
+
+    #[test]
+    fn rates_are_taken_to_the_nearest_65_536th_and_refused_outside_0_and_1() {
+        assert_eq!(NoiseRate::new(0.1).unwrap().per_65_536(), 6554);
+        for probability in [-0.01, 1.01, f64::NAN, f64::INFINITY] {
+            assert_eq!(NoiseRate::new(probability), None);
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! Scenarios: what a swarm is put into, and the trials of a generation.
+
+use crate::noise::{NoiseRate, NoiseStream};
+use crate::seed::{Purpose, SeedTree, Stream, uniform_below};
+use crate::torus::{Grid, Heading, Pose};
+
+/// The conditions of a run, whatever the genome.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scenario {
+    grid: Grid,
+    robots: u32,
+    steps: u32,
+    noise: NoiseRate,
+}
+
+/// No swarm can be put into this.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ScenarioError {
+    /// No robot, or more than cells.
+    #[error("{robots} robots on a {grid} grid; from 1 to {} fit", grid.cells())]
+    RobotsDoNotFit {
+        /// Robots asked for.
+        robots: u32,
+        /// The grid.
+        grid: Grid,
+    },
+    /// No step at all.
+    #[error("0 steps; at least 1 is needed")]
+    NoSteps,
+}
+
+impl Scenario {
+    /// A swarm of `robots` on `grid` for `steps`.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] unless there is a robot, every robot has a cell and there is a step.
+    pub fn new(
+        grid: Grid,
+        robots: u32,
+        steps: u32,
+        noise: NoiseRate,
+    ) -> Result<Self, ScenarioError> {
+        if robots == 0 || robots > grid.cells() {
+            Err(ScenarioError::RobotsDoNotFit { robots, grid })
+        } else if steps == 0 {
+            Err(ScenarioError::NoSteps)
+        } else {
+            Ok(Self {
+                grid,
+                robots,
+                steps,
+                noise,
+            })
+        }
+    }
+
+    /// The grid.
+    #[must_use]
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// Swarm size N.
+    #[must_use]
+    pub fn robots(&self) -> u32 {
+        self.robots
+    }
+
+    /// Evaluation length T, in steps.
+    #[must_use]
+    pub fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// Sensor noise.
+    #[must_use]
+    pub fn noise(&self) -> NoiseRate {
+        self.noise
+    }
+
+    /// Bits that the swarm senses in one repetition, N·T·R.
+    #[must_use]
+    pub fn scored_bits(&self, sensors: usize) -> u64 {
+        u64::from(self.robots) * u64::from(self.steps) * sensors as u64
+    }
+
+    /// A repetition of a generation: its starting poses and noise, shared by all genomes.
+    #[must_use]
+    pub fn trial(&self, seeds: SeedTree, generation: u32, repetition: u32) -> Trial {
+        let stream = |purpose| seeds.stream(purpose, generation, repetition);
+        Trial {
+            starts: random_poses(self.grid, self.robots, &mut stream(Purpose::Starts)),
+            noise: NoiseStream::new(stream(Purpose::Noise), self.noise),
+        }
+    }
+}
+
+/// What differs between the repetitions of an evaluation.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// Starting poses, in index order.
+    pub starts: Vec<Pose>,
+    /// The noise met.
+    pub noise: NoiseStream,
+}
+
+/// Poses on uniformly drawn free cells, with uniform headings.
+///
+/// Each robot in turn draws one of the cells still free, by its place in a list from which drawn
+/// cells are swapped to the end, then its heading.
+///
+/// # Panics
+/// If there are more robots than cells.
+#[must_use]
+pub fn random_poses(grid: Grid, robots: u32, rng: &mut Stream) -> Vec<Pose> {
+    random_poses_among((0..grid.cells()).collect(), grid, robots, rng)
+}
+
+/// [`random_poses`] on the given cells (numbered as [`Grid::cell`]) only.
+///
+/// # Panics
+/// If there are more robots than cells.
+#[must_use]
+pub fn random_poses_among(
+    mut free: Vec<u32>,
+    grid: Grid,
+    robots: u32,
+    rng: &mut Stream,
+) -> Vec<Pose> {
+    let width = u32::from(grid.width());
+    (0..robots)
+        .map(|_| {
+            let drawn = uniform_below(rng, free.len() as u64) as usize;
+            let cell = free.swap_remove(drawn);
+            Pose {
+                x: (cell % width) as u16,
+                y: (cell / width) as u16,
+                heading: Heading::from_low_bits(uniform_below(rng, 4) as u32),
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::check_poses;
+
+    #[test]
+    fn value_stability_trial() {
+        let grid = Grid::new(15, 15).unwrap();
+        let scenario = Scenario::new(grid, 3, 1, NoiseRate::NONE).unwrap();
+        let trial = scenario.trial(SeedTree::new(1), 0, 0);
+        let poses: Vec<_> = trial
+            .starts
+            .iter()
+            .map(|p| (p.x, p.y, p.heading as u8))
+            .collect();
+        assert_eq!(poses, [(12, 9, 3), (4, 14, 2), (12, 0, 3)]);
+    }
+
+    #[test]
+    fn a_full_grid_has_a_robot_on_every_cell() {
+        let grid = Grid::new(5, 7).unwrap();
+        let scenario = Scenario::new(grid, 35, 1, NoiseRate::NONE).unwrap();
+        let trial = scenario.trial(SeedTree::new(1), 0, 0);
+        assert_eq!(check_poses(grid, &trial.starts), Ok(()));
+        assert_eq!(trial.starts.len(), 35);
+    }
+
+    #[test]
+    fn no_robots_too_many_robots_and_no_steps_are_refused() {
+        let grid = Grid::new(3, 3).unwrap();
+        for robots in [0, 10] {
+            assert_eq!(
+                Scenario::new(grid, robots, 1, NoiseRate::NONE),
+                Err(ScenarioError::RobotsDoNotFit { robots, grid })
+            );
+        }
+        assert_eq!(
+            Scenario::new(grid, 1, 0, NoiseRate::NONE),
+            Err(ScenarioError::NoSteps)
+        );
+    }
+}

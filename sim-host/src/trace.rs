@@ -1,0 +1,46 @@
+//! Traces: everything that happened in a run, step by step.
+
+use crate::torus::Pose;
+use crate::world::World;
+use minimal_surprise_controller::{Decision, SensorBits};
+
+/// One step: the state before it, and what the robots sensed and decided in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TraceStep {
+    /// Poses before the step.
+    pub poses: Vec<Pose>,
+    /// What the robots sensed, noise included.
+    pub readings: Vec<SensorBits>,
+    /// What they decided and now predict.
+    pub decisions: Vec<Decision>,
+}
+
+/// A recorded run: its steps and the poses after the last one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Trace {
+    /// The steps, in order.
+    pub steps: Vec<TraceStep>,
+    /// Poses after the last step.
+    pub final_poses: Vec<Pose>,
+}
+
+impl Trace {
+    /// A trace that starts from the world as it is now.
+    #[must_use]
+    pub fn starting_from(world: &World) -> Self {
+        Self {
+            steps: Vec::new(),
+            final_poses: world.poses().to_vec(),
+        }
+    }
+
+    /// Adds the step that the world has just done.
+    pub fn record(&mut self, world: &World) {
+        let before = core::mem::replace(&mut self.final_poses, world.poses().to_vec());
+        self.steps.push(TraceStep {
+            poses: before,
+            readings: world.readings().to_vec(),
+            decisions: world.decisions().to_vec(),
+        });
+    }
+}

@@ -1,0 +1,270 @@
+//! The world: a swarm on a torus, one step at a time.
+//!
+//! A step: every robot senses the occupancy at time t; then, in index order, each decides and
+//! acts. A robot going straight moves if the cell ahead was empty at time t and no robot of a
+//! lower index has taken it; a cell vacated in this step is still blocked. Noise changes what a
+//! robot senses, never whether it may move.
+
+use crate::noise::NoiseStream;
+use crate::torus::{Grid, Heading, Pose};
+use minimal_surprise_controller::sensor::MAX_SENSORS;
+use minimal_surprise_controller::{Action, Controller, Decision, SensorBits, SensorModel, State};
+
+/// How far a robot senses, in cells: the width of the border around the board.
+const REACH: usize = 2;
+
+/// A swarm cannot stand like this.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum WorldError {
+    /// A robot is outside the grid.
+    #[error("robot {robot} is at ({x}, {y}), outside the {grid} grid")]
+    OutsideGrid {
+        /// Index of the robot.
+        robot: usize,
+        /// Its x.
+        x: u16,
+        /// Its y.
+        y: u16,
+        /// The grid.
+        grid: Grid,
+    },
+    /// Two robots share a cell.
+    #[error("robot {robot} is at ({x}, {y}), where robot {other} is already")]
+    Overlap {
+        /// Index of the robot.
+        robot: usize,
+        /// Index of the robot that was there first.
+        other: usize,
+        /// Their x.
+        x: u16,
+        /// Their y.
+        y: u16,
+    },
+}
+
+/// Checks that every robot is on the grid and no two share a cell.
+///
+/// # Errors
+/// [`WorldError`] names the first robot that is wrong.
+pub fn check_poses(grid: Grid, poses: &[Pose]) -> Result<(), WorldError> {
+    let mut taken = vec![false; grid.cells() as usize];
+    for (robot, &Pose { x, y, .. }) in poses.iter().enumerate() {
+        if x >= grid.width() || y >= grid.height() {
+            return Err(WorldError::OutsideGrid { robot, x, y, grid });
+        }
+        let cell = &mut taken[grid.cell(x, y) as usize];
+        if core::mem::replace(cell, true) {
+            let other = poses
+                .iter()
+                .position(|pose| pose.x == x && pose.y == y)
+                .unwrap_or(robot);
+            return Err(WorldError::Overlap { robot, other, x, y });
+        }
+    }
+    Ok(())
+}
+
+/// A swarm on a torus.
+#[derive(Clone, Debug)]
+pub struct World {
+    grid: Grid,
+    board: Board,
+    offsets: [[isize; MAX_SENSORS]; 4],
+    sensors: usize,
+    poses: Vec<Pose>,
+    states: Vec<State>,
+    readings: Vec<SensorBits>,
+    decisions: Vec<Decision>,
+    vacated: Vec<(u16, u16)>,
+    step: u32,
+}
+
+impl World {
+    /// A swarm at its start: network states, last actions and predictions as before the first step.
+    ///
+    /// # Errors
+    /// [`WorldError`] if a robot is outside the grid or two share a cell.
+    pub fn new(grid: Grid, starts: &[Pose], controller: &Controller) -> Result<Self, WorldError> {
+        check_poses(grid, starts)?;
+        let mut board = Board::empty(grid);
+        for pose in starts {
+            board.set(pose.x, pose.y, true);
+        }
+        let model = controller.topology().model();
+        Ok(Self {
+            grid,
+            offsets: Heading::ALL.map(|heading| board.offsets(model, heading)),
+            board,
+            sensors: model.sensors(),
+            poses: starts.to_vec(),
+            states: vec![State::new(controller); starts.len()],
+            readings: vec![SensorBits::NONE; starts.len()],
+            decisions: Vec::with_capacity(starts.len()),
+            vacated: Vec::new(),
+            step: 0,
+        })
+    }
+
+    /// One step of all robots.
+    pub fn step(&mut self, controller: &Controller, noise: &mut NoiseStream) {
+        self.sense(noise);
+        self.decisions.clear();
+        for (state, &reading) in self.states.iter_mut().zip(&self.readings) {
+            self.decisions.push(controller.step(state, reading));
+        }
+        self.act();
+    }
+
+    /// [`World::step`] with decisions from elsewhere: a recording, or a robot on a line. The
+    /// robots' own states stay as they are.
+    ///
+    /// # Panics
+    /// Unless there is one decision a robot.
+    pub fn step_with(
+        &mut self,
+        noise: &mut NoiseStream,
+        decide: impl FnOnce(&[SensorBits]) -> Vec<Decision>,
+    ) {
+        self.sense(noise);
+        self.decisions = decide(&self.readings);
+        assert_eq!(
+            self.decisions.len(),
+            self.poses.len(),
+            "one decision a robot"
+        );
+        self.act();
+    }
+
+    fn sense(&mut self, noise: &mut NoiseStream) {
+        for (pose, reading) in self.poses.iter().zip(&mut self.readings) {
+            let offsets = &self.offsets[pose.heading as usize];
+            let bits = self.board.sense(pose.x, pose.y, &offsets[..self.sensors]);
+            *reading = SensorBits::new(bits);
+        }
+        noise.flip(self.step, &mut self.readings);
+    }
+
+    /// Cells are taken at once and vacated at the end of the step.
+    fn act(&mut self) {
+        for (pose, decision) in self.poses.iter_mut().zip(&self.decisions) {
+            match decision.action {
+                Action::Turn => pose.heading = pose.heading.turned(decision.turn),
+                Action::Straight => {
+                    let (dx, dy) = pose.heading.ahead();
+                    let (x, y) = self.grid.moved(pose.x, pose.y, dx, dy);
+                    if !self.board.occupied(x, y) {
+                        self.board.set(x, y, true);
+                        self.vacated.push((pose.x, pose.y));
+                        (pose.x, pose.y) = (x, y);
+                    }
+                }
+            }
+        }
+        for (x, y) in self.vacated.drain(..) {
+            self.board.set(x, y, false);
+        }
+        self.step += 1;
+    }
+
+    /// The grid.
+    #[must_use]
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// Poses now, in index order.
+    #[must_use]
+    pub fn poses(&self) -> &[Pose] {
+        &self.poses
+    }
+
+    /// Network states now, in index order.
+    #[must_use]
+    pub fn states(&self) -> &[State] {
+        &self.states
+    }
+
+    /// What the robots sensed in the last step, noise included.
+    #[must_use]
+    pub fn readings(&self) -> &[SensorBits] {
+        &self.readings
+    }
+
+    /// What the robots decided in the last step; empty before the first.
+    #[must_use]
+    pub fn decisions(&self) -> &[Decision] {
+        &self.decisions
+    }
+
+    /// Steps done.
+    #[must_use]
+    pub fn steps(&self) -> u32 {
+        self.step
+    }
+}
+
+/// Occupancy, a byte a cell, with a border that repeats what lies across the edge, so that sensing
+/// is a load at a fixed offset.
+#[derive(Clone, Debug)]
+struct Board {
+    grid: Grid,
+    stride: usize,
+    cells: Vec<u8>,
+}
+
+impl Board {
+    fn empty(grid: Grid) -> Self {
+        let stride = usize::from(grid.width()) + 2 * REACH;
+        let rows = usize::from(grid.height()) + 2 * REACH;
+        Self {
+            grid,
+            stride,
+            cells: vec![0; stride * rows],
+        }
+    }
+
+    fn index(&self, x: u16, y: u16) -> usize {
+        (usize::from(y) + REACH) * self.stride + usize::from(x) + REACH
+    }
+
+    fn occupied(&self, x: u16, y: u16) -> bool {
+        self.cells[self.index(x, y)] != 0
+    }
+
+    /// Sets the cell and its copies in the border.
+    fn set(&mut self, x: u16, y: u16, occupied: bool) {
+        for row in places(y, self.grid.height()) {
+            for column in places(x, self.grid.width()) {
+                self.cells[row * self.stride + column] = occupied.into();
+            }
+        }
+    }
+
+    fn offsets(&self, model: SensorModel, heading: Heading) -> [isize; MAX_SENSORS] {
+        let mut offsets = [0; MAX_SENSORS];
+        for (offset, &cell) in offsets.iter_mut().zip(model.cells()) {
+            let (dx, dy) = heading.offset(cell);
+            *offset = dy as isize * self.stride as isize + dx as isize;
+        }
+        offsets
+    }
+
+    #[inline]
+    fn sense(&self, x: u16, y: u16, offsets: &[isize]) -> u16 {
+        let centre = self.index(x, y);
+        let mut bits = 0;
+        for (sensor, &offset) in offsets.iter().enumerate() {
+            bits |= u16::from(self.cells[centre.wrapping_add_signed(offset)]) << sensor;
+        }
+        bits
+    }
+}
+
+/// Places of a coordinate on the board along one axis: its own and up to two in the border.
+fn places(at: u16, side: u16) -> impl Iterator<Item = usize> {
+    let (at, side) = (usize::from(at), usize::from(side));
+    let own = at + REACH;
+    let above = (at < REACH).then_some(own + side);
+    let below = (at + REACH >= side).then(|| own.wrapping_sub(side));
+    core::iter::once(own).chain(above).chain(below)
+}
