@@ -151,13 +151,13 @@ impl RunDir {
         if !config.is_file() {
             return Err(missing(CONFIG));
         }
-        let lock = lock(path)?;
         if path.join(DONE).is_file() {
             let hash = String::from_utf8_lossy(&files::read(&path.join(DONE))?)
                 .trim()
                 .to_owned();
             return Ok(Found::Finished(hash));
         }
+        let lock = lock(path)?;
         let checkpoint = path.join(CHECKPOINT);
         if !checkpoint.is_file() {
             return Err(missing(CHECKPOINT));
