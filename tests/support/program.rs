@@ -115,7 +115,6 @@ impl Evolver {
     ///
     /// # Panics
     /// If it cannot be started.
-    #[must_use]
     pub fn run(&self, arguments: &[impl AsRef<OsStr>]) -> Finished {
         let output = self
             .command(arguments)
