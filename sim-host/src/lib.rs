@@ -5,7 +5,7 @@
 //! a result.
 //!
 //! Data flows one way: [`torus`] → [`seed`] → [`noise`] → [`world`] → [`scenario`] → [`evaluation`] →
-//! [`trace`].
+//! [`trace`] → [`structures`].
 #![forbid(unsafe_code)]
 
 pub mod drawing;
@@ -13,6 +13,7 @@ pub mod evaluation;
 pub mod noise;
 pub mod scenario;
 pub mod seed;
+pub mod structures;
 pub mod torus;
 pub mod trace;
 pub mod world;
@@ -21,6 +22,7 @@ pub use evaluation::{Evaluation, Outcome, evaluate, run};
 pub use noise::{NoiseRate, NoiseStream};
 pub use scenario::{Scenario, ScenarioError, Trial};
 pub use seed::{Purpose, SeedTree};
+pub use structures::{Structure, Structures, classify};
 pub use torus::{Grid, GridError, Heading, Pose};
 pub use trace::{Trace, TraceStep};
 pub use world::{World, WorldError};
