@@ -5,11 +5,12 @@
 //! a result.
 //!
 //! Data flows one way: [`torus`] → [`seed`] → [`noise`] → [`world`] → [`scenario`] → [`evaluation`] →
-//! [`trace`] → [`structures`].
+//! [`trace`] → [`metrics`] → [`structures`].
 #![forbid(unsafe_code)]
 
 pub mod drawing;
 pub mod evaluation;
+pub mod metrics;
 pub mod noise;
 pub mod scenario;
 pub mod seed;
@@ -19,6 +20,7 @@ pub mod trace;
 pub mod world;
 
 pub use evaluation::{Evaluation, Outcome, evaluate, run};
+pub use metrics::{Match, Measures, similarity};
 pub use noise::{NoiseRate, NoiseStream};
 pub use scenario::{Scenario, ScenarioError, Trial};
 pub use seed::{Purpose, SeedTree};

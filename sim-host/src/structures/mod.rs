@@ -15,6 +15,7 @@ mod tests;
 pub use clusters::{Clusters, Grouping, MOORE_MIN, VON_NEUMANN_MIN};
 pub use lines::{Axis, LENGTH_MIN, Line, LineCounts, LineOrientation};
 
+use crate::metrics::Match;
 use crate::torus::{Grid, Pose};
 use crate::world::WorldError;
 use field::Field;
@@ -65,6 +66,18 @@ impl Structure {
             Self::RandomDispersion => "random dispersion",
             Self::Square => "square",
             Self::TriangularLattice => "triangular lattice",
+        }
+    }
+}
+
+impl Structure {
+    /// What similarity to an earlier state goes by: triangular lattices are compared by cells,
+    /// since their robots keep turning, everything else by poses (paper, Sec. 3.4).
+    #[must_use]
+    pub fn matching(self) -> Match {
+        match self {
+            Self::TriangularLattice => Match::Cell,
+            _ => Match::Pose,
         }
     }
 }
