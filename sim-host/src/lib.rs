@@ -8,6 +8,7 @@
 //! [`trace`] → [`metrics`] → [`structures`].
 #![forbid(unsafe_code)]
 
+pub mod damage;
 pub mod drawing;
 pub mod evaluation;
 pub mod metrics;
@@ -19,6 +20,7 @@ pub mod torus;
 pub mod trace;
 pub mod world;
 
+pub use damage::{Area, Damage, DamageError};
 pub use evaluation::{Evaluation, Outcome, evaluate, run};
 pub use metrics::{Match, Measures, similarity};
 pub use noise::{NoiseRate, NoiseStream};
