@@ -5,22 +5,28 @@
 //! a result.
 //!
 //! Data flows one way: [`torus`] → [`seed`] → [`noise`] → [`world`] → [`scenario`] → [`evaluation`] →
-//! [`trace`].
+//! [`trace`] → [`metrics`] → [`structures`].
 #![forbid(unsafe_code)]
 
+pub mod damage;
 pub mod drawing;
 pub mod evaluation;
+pub mod metrics;
 pub mod noise;
 pub mod scenario;
 pub mod seed;
+pub mod structures;
 pub mod torus;
 pub mod trace;
 pub mod world;
 
+pub use damage::{Area, Damage, DamageError};
 pub use evaluation::{Evaluation, Outcome, evaluate, run};
+pub use metrics::{Match, Measures, similarity};
 pub use noise::{NoiseRate, NoiseStream};
 pub use scenario::{Scenario, ScenarioError, Trial};
 pub use seed::{Purpose, SeedTree};
+pub use structures::{Structure, Structures, classify};
 pub use torus::{Grid, GridError, Heading, Pose};
 pub use trace::{Trace, TraceStep};
 pub use world::{World, WorldError};
