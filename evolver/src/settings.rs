@@ -280,10 +280,7 @@ impl Settings {
         })?;
         let from_path = given.value("from", None, |text| Ok(Some(text.to_owned())))?;
         let seed = match given.place("seed") {
-            Some(_) => given.value("seed", 0, |text| {
-                text.parse()
-                    .map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
-            })?,
+            Some(_) => given.value("seed", 0, seed)?,
             None => draw_seed(),
         };
         let template_name = |partly: bool| match topology.prediction() {
@@ -370,14 +367,22 @@ pub fn out(given: &Given) -> Option<PathBuf> {
 
 const PROBABILITY: &str = "expected a probability from 0 to 1";
 
-fn probability(text: &str) -> Result<f64, String> {
+/// A probability.
+///
+/// # Errors
+/// What would be valid.
+pub fn probability(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
         _ => Err(PROBABILITY.to_owned()),
     }
 }
 
-fn count(text: &str, most: u32) -> Result<u32, String> {
+/// A whole number from 1 to `most`.
+///
+/// # Errors
+/// What would be valid.
+pub fn count(text: &str, most: u32) -> Result<u32, String> {
     match text.parse() {
         Ok(value) if (1..=most).contains(&value) => Ok(value),
         _ => Err(format!("expected a whole number from 1 to {most}")),
@@ -395,6 +400,15 @@ pub fn parse_grid(text: &str) -> Result<Grid, String> {
     let (width, height) =
         sides.ok_or_else(|| "expected width and height in cells, as in 15x15".to_owned())?;
     Grid::new(width, height).map_err(|error| error.to_string())
+}
+
+/// A seed.
+///
+/// # Errors
+/// What would be valid.
+pub fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
 }
 
 fn parse_model(text: &str) -> Result<SensorModel, String> {

@@ -6,13 +6,13 @@ use console::Term;
 use minimal_surprise_controller::codec::FORMAT_VERSION;
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{EncodedGenome, KERNEL_ID};
-use minimal_surprise_sim::drawing::draw;
-use minimal_surprise_sim::{Grid, Pose};
+use minimal_surprise_sim::structures::{Structures, classify};
+use minimal_surprise_sim::{Grid, Pose, drawing};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Columns and rows of the picture when the output is not a terminal.
-const WITHOUT_TERMINAL: (u16, u16) = (120, 60);
+/// Rows and columns of the picture when the output is not a terminal.
+const WITHOUT_TERMINAL: (u16, u16) = (60, 120);
 
 /// How this program was called, for commands that people can copy.
 #[must_use]
@@ -26,21 +26,18 @@ pub fn program() -> &'static str {
 
 /// The swarm's picture, two columns a cell; where it does not fit, a line that says so.
 #[must_use]
-pub fn picture(grid: Grid, poses: &[Pose]) -> String {
-    let (rows, columns) = Term::stdout()
-        .size_checked()
-        .unwrap_or((WITHOUT_TERMINAL.1, WITHOUT_TERMINAL.0));
+pub fn picture_with(grid: Grid, poses: &[Pose], sign: impl Fn(u32, &Pose) -> String) -> String {
+    let (rows, columns) = Term::stdout().size_checked().unwrap_or(WITHOUT_TERMINAL);
     if 2 * u32::from(grid.width()) > u32::from(columns) || grid.height() > 4 * rows {
         return format!("(a {grid} grid is too large for this terminal to be drawn)");
     }
-    draw(grid, poses)
-        .lines()
-        .map(|row| {
-            let cells: Vec<String> = row.chars().map(String::from).collect();
-            format!("  {}", cells.join(" "))
-        })
-        .collect::<Vec<_>>()
-        .join("\n")
+    let mut cells = vec![drawing::EMPTY.to_string(); grid.cells() as usize];
+    for (robot, pose) in (0..).zip(poses) {
+        cells[grid.cell(pose.x, pose.y) as usize] = sign(robot, pose);
+    }
+    let rows = cells.chunks(grid.width().into()).rev();
+    let lines: Vec<String> = rows.map(|row| format!("  {}", row.join(" "))).collect();
+    lines.join("\n")
 }
 
 /// What an evolution came to, and what to do next.
