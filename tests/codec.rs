@@ -458,6 +458,11 @@ proptest! {
     }
 }
 
+/// A number below `end`.
+fn below(end: usize, rng: &mut ChaCha8Rng) -> usize {
+    rng.next_u32() as usize % end
+}
+
 /// The name of what decoding came to.
 fn outcome(result: Result<EncodedGenome<'_>, DecodeError>) -> String {
     match result {
@@ -475,45 +480,45 @@ fn half_a_million_random_containers_reach_every_outcome_and_never_panic() {
     let mut rng = rng();
     let mut outcomes = BTreeMap::<String, u32>::new();
     let valid = containers();
-    for case in 0..500_000_u32 {
+    for case in 0..500_000 {
         // Mostly the small ones, whose checksums take little time.
-        let small = rng.next_u32() % 32 > 0;
+        let any_size = below(32, &mut rng) == 0;
         let mut bytes = loop {
-            let bytes = &valid[rng.next_u32() as usize % valid.len()];
-            if !small || bytes.len() < 200 {
+            let bytes = &valid[below(valid.len(), &mut rng)];
+            if any_size || bytes.len() < 200 {
                 break bytes.clone();
             }
         };
         let header_end = PREFIX_BYTES + usize::from(bytes[5]);
-        if case % 4 == 0 {
+        if below(4, &mut rng) == 0 {
             // A beginning of the header, then anything.
-            let right = PREFIX_BYTES + rng.next_u32() as usize % 20;
+            let right = PREFIX_BYTES + below(20, &mut rng);
             rng.fill_bytes(&mut bytes[right..]);
         } else {
             rng.fill_bytes(&mut bytes[header_end..]);
         }
-        if rng.next_u32() % 16 == 0 {
+        if below(16, &mut rng) == 0 {
             bytes[header_end..header_end + 2].copy_from_slice(&i16::MIN.to_le_bytes());
         }
-        if rng.next_u32() % 16 == 0 {
-            bytes.truncate(bytes.len() - rng.next_u32() as usize % 100);
+        if below(16, &mut rng) == 0 {
+            bytes.truncate(bytes.len() - below(100, &mut rng));
             repair_length(&mut bytes);
         }
-        // Up to three bytes at the front that are wrong, and at times a wrong length or checksum.
-        for _ in 0..rng.next_u32() % 4 {
-            let place =
-                PREFIX_BYTES * (rng.next_u32() % 8).min(1) as usize + rng.next_u32() as usize % 24;
-            let byte = rng.next_u32();
-            bytes[place] = if byte & 0x300 == 0 {
-                byte as u8
+        // Up to three wrong bytes at the front, and at times a wrong length or checksum.
+        for _ in 0..below(4, &mut rng) {
+            let start = if below(8, &mut rng) == 0 {
+                0
             } else {
-                byte as u8 % 5
+                PREFIX_BYTES
             };
+            let place = start + below(24, &mut rng);
+            let end = if below(4, &mut rng) == 0 { 256 } else { 5 };
+            bytes[place] = below(end, &mut rng) as u8;
         }
-        if rng.next_u32() % 16 > 0 {
+        if below(16, &mut rng) > 0 {
             repair_length(&mut bytes);
         }
-        if rng.next_u32() % 64 > 0 {
+        if below(64, &mut rng) > 0 {
             repair_crc(&mut bytes);
         }
         let result = decode(&bytes);
@@ -977,6 +982,18 @@ fn value_stability_decode() {
         genome.weights()[..6],
         [-1243, -1748, 1797, 1017, -548, -866]
     );
+}
+
+#[test]
+fn the_example_of_the_documentation_is_the_fixture() {
+    let page = include_str!("../docs/genome-format.md");
+    for (line, bytes) in FIXTURE.chunks(16).enumerate() {
+        let hex: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        let (left, right) = hex.split_at(hex.len().min(8));
+        let expected = format!("{line:x}0  {}  {}", left.join(" "), right.join(" "));
+        let expected = expected.trim_end();
+        assert!(page.lines().any(|l| l == expected), "{expected}");
+    }
 }
 
 #[test]
