@@ -1,0 +1,30 @@
+//! Notes the revision and the compiler that a program was built from and with, for `meta.json`.
+
+use std::process::Command;
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=../.git/HEAD");
+    println!("cargo:rerun-if-changed=../.git/logs/HEAD");
+    let compiler = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned());
+    let lines = [
+        (
+            "BUILD_REVISION",
+            first_line("git", &["describe", "--always", "--dirty"]),
+        ),
+        ("BUILD_COMPILER", first_line(&compiler, &["--version"])),
+    ];
+    for (name, line) in lines {
+        println!(
+            "cargo:rustc-env={name}={}",
+            line.as_deref().unwrap_or("unknown")
+        );
+    }
+}
+
+fn first_line(program: &str, arguments: &[&str]) -> Option<String> {
+    let output = Command::new(program).args(arguments).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    let line = text.lines().next()?.trim().to_owned();
+    (output.status.success() && !line.is_empty()).then_some(line)
+}

@@ -1,0 +1,124 @@
+//! Checkpoints: an evolution between two generations, in one file.
+//!
+//! postcard, then its CRC-32C in four bytes, little-endian. It holds the text of the run's
+//! `config.toml`, so that a run is never continued under other settings.
+
+use crate::evolution::Population;
+use crate::experiment::{Experiment, GenerationRecord};
+use crate::run_hash::RunHash;
+use crate::settings::Settings;
+use minimal_surprise_controller::codec::CRC_32C;
+use minimal_surprise_controller::{Genome, KERNEL_ID, KernelId, Topology};
+use serde::{Deserialize, Serialize};
+
+/// Version of the file's layout.
+const SCHEMA: u32 = 1;
+
+/// The bytes are not a checkpoint that can be continued from.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    /// The file was cut or changed.
+    #[error("the checkpoint is damaged: {0}")]
+    Damaged(&'static str),
+    /// Written by a program with another layout.
+    #[error("the checkpoint has schema version {found}; this program reads version {SCHEMA}")]
+    OtherSchema {
+        /// The version found.
+        found: u32,
+    },
+    /// Written by a program with another arithmetic.
+    #[error("the checkpoint belongs to kernel {found}; this program is kernel {KERNEL_ID}")]
+    OtherKernel {
+        /// The kernel found.
+        found: KernelId,
+    },
+    /// The run's settings were edited.
+    #[error("config.toml is not what the run was started with")]
+    OtherSettings,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    schema: u32,
+    kernel: KernelId,
+    settings: String,
+    generation: u32,
+    genomes: Vec<Vec<i16>>,
+    history: Vec<GenerationRecord>,
+    hash: RunHash,
+    best: Option<Vec<i16>>,
+}
+
+/// The bytes of a checkpoint.
+#[must_use]
+pub fn encode(experiment: &Experiment, settings_text: &str) -> Vec<u8> {
+    let population = experiment.population();
+    let weights = |genome: &Genome| genome.weights().to_vec();
+    let stored = Stored {
+        schema: SCHEMA,
+        kernel: KERNEL_ID,
+        settings: settings_text.to_owned(),
+        generation: population.generation(),
+        genomes: population.ask().iter().map(weights).collect(),
+        history: experiment.history().to_vec(),
+        hash: experiment.hash(),
+        best: experiment.best().map(weights),
+    };
+    let mut bytes = postcard::to_allocvec(&stored).expect("memory is the only limit");
+    let crc = CRC_32C.checksum(&bytes);
+    bytes.extend(crc.to_le_bytes());
+    bytes
+}
+
+/// The experiment in a checkpoint.
+///
+/// # Errors
+/// [`CheckpointError`] if it is damaged or belongs to another program or other settings.
+pub fn decode(
+    bytes: &[u8],
+    settings: Settings,
+    settings_text: &str,
+) -> Result<Experiment, CheckpointError> {
+    use CheckpointError::Damaged;
+    let (body, crc) = bytes.split_last_chunk().ok_or(Damaged("too short"))?;
+    if CRC_32C.checksum(body) != u32::from_le_bytes(*crc) {
+        return Err(Damaged("its checksum does not match"));
+    }
+    // The version comes first, so that it can be read whatever follows.
+    let (found, _) = postcard::take_from_bytes(body).map_err(|_| Damaged("no version"))?;
+    if found != SCHEMA {
+        return Err(CheckpointError::OtherSchema { found });
+    }
+    let stored: Stored = postcard::from_bytes(body).map_err(|_| Damaged("malformed"))?;
+    if stored.kernel != KERNEL_ID {
+        return Err(CheckpointError::OtherKernel {
+            found: stored.kernel,
+        });
+    }
+    if stored.settings != settings_text {
+        return Err(CheckpointError::OtherSettings);
+    }
+    let genome = |weights: &Vec<i16>| genome(settings.topology, weights);
+    let genomes: Vec<Genome> = stored
+        .genomes
+        .iter()
+        .map(genome)
+        .collect::<Result<_, _>>()?;
+    let best = stored.best.as_ref().map(genome).transpose()?;
+    if genomes.len() as u64 != u64::from(settings.population) {
+        return Err(Damaged("the population has another size"));
+    }
+    let population = Population::restored(stored.generation, genomes);
+    Ok(Experiment::restored(
+        settings,
+        population,
+        stored.history,
+        stored.hash,
+        best,
+    ))
+}
+
+fn genome(topology: Topology, weights: &[i16]) -> Result<Genome, CheckpointError> {
+    Genome::from_weights(topology, weights)
+        .map_err(|_| CheckpointError::Damaged("a genome does not fit the topology"))
+}

@@ -1,0 +1,194 @@
+//! An experiment: evolution and world together, a generation at a time.
+
+use crate::evolution::{Population, best_slot};
+use crate::run_hash::RunHash;
+use crate::settings::Settings;
+use minimal_surprise_controller::{Controller, Genome, Provenance};
+use minimal_surprise_sim::evaluation::{Evaluation, Outcome, evaluate, run};
+use minimal_surprise_sim::{Pose, SeedTree, Trial, WorldError};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// What a generation came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GenerationRecord {
+    /// Number of the generation, from 0.
+    pub generation: u32,
+    /// Matches of the best genome.
+    pub best_matches: u64,
+    /// Sum of the matches of all genomes.
+    pub total_matches: u64,
+    /// Matches of the worst genome.
+    pub worst_matches: u64,
+    /// Slot of the best genome.
+    pub best_slot: u32,
+    /// The repetition that gave the best genome its fitness, its worst one.
+    pub worst_repetition: u32,
+}
+
+/// An evolution in progress.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    settings: Settings,
+    /// The generation to evaluate next; after the last one, the last one.
+    population: Population,
+    history: Vec<GenerationRecord>,
+    hash: RunHash,
+    best: Option<Genome>,
+}
+
+/// What an evolution results in: the last generation's best genome, run once more from where it
+/// had its fitness.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// The genome.
+    pub genome: Genome,
+    /// Where it comes from.
+    pub provenance: Provenance,
+    /// The repetition that it was run from.
+    pub repetition: u32,
+    /// Starting poses.
+    pub starts: Vec<Pose>,
+    /// What the run came to.
+    pub outcome: Outcome,
+    /// The run's hash.
+    pub hash: RunHash,
+}
+
+impl Experiment {
+    /// An evolution before its first generation.
+    #[must_use]
+    pub fn new(settings: Settings) -> Self {
+        let seeds = SeedTree::new(settings.seed);
+        let size = settings.population;
+        let population = match &settings.from {
+            None => Population::random(settings.topology, size, seeds),
+            Some(ancestor) => Population::mutants_of(ancestor, size, settings.mutation, seeds),
+        };
+        Self {
+            settings,
+            population,
+            history: Vec::new(),
+            hash: RunHash::default(),
+            best: None,
+        }
+    }
+
+    /// An evolution stored earlier.
+    #[must_use]
+    pub fn restored(
+        settings: Settings,
+        population: Population,
+        history: Vec<GenerationRecord>,
+        hash: RunHash,
+        best: Option<Genome>,
+    ) -> Self {
+        Self {
+            settings,
+            population,
+            history,
+            hash,
+            best,
+        }
+    }
+
+    /// Evaluates a generation, in parallel, and moves on to the next. Results do not depend on the
+    /// number of threads.
+    pub fn advance(&mut self) -> GenerationRecord {
+        let seeds = SeedTree::new(self.settings.seed);
+        let generation = self.history.len() as u32;
+        let scenario = &self.settings.scenario;
+        let trials: Vec<Trial> = (0..self.settings.repetitions)
+            .map(|repetition| scenario.trial(seeds, generation, repetition))
+            .collect();
+        let evaluations: Vec<Evaluation> = self
+            .population
+            .ask()
+            .par_iter()
+            .with_max_len(1)
+            .map(|genome| evaluate(genome, scenario, &trials))
+            .collect();
+        let matches: Vec<u64> = evaluations.iter().map(|e| e.matches).collect();
+        let best = best_slot(&matches);
+        let record = GenerationRecord {
+            generation,
+            best_matches: matches[best],
+            total_matches: matches.iter().sum(),
+            worst_matches: matches.iter().copied().min().unwrap_or(0),
+            best_slot: best as u32,
+            worst_repetition: evaluations[best].worst_repetition,
+        };
+        self.hash = self.hash.generation(&matches);
+        self.history.push(record);
+        self.best = Some(self.population.ask()[best].clone());
+        if !self.is_finished() {
+            self.population = self
+                .population
+                .tell(&matches, self.settings.mutation, seeds);
+        }
+        record
+    }
+
+    /// Whether every generation has been evaluated.
+    #[must_use]
+    pub fn is_finished(&self) -> bool {
+        self.history.len() as u64 >= u64::from(self.settings.generations)
+    }
+
+    /// The result so far: of the last generation evaluated; none before the first.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the trial does not fit its own grid.
+    pub fn finding(&self) -> Result<Option<Finding>, WorldError> {
+        let (Some(record), Some(genome)) = (self.history.last(), &self.best) else {
+            return Ok(None);
+        };
+        let seeds = SeedTree::new(self.settings.seed);
+        let scenario = &self.settings.scenario;
+        let trial = scenario.trial(seeds, record.generation, record.worst_repetition);
+        let outcome = run(&Controller::new(genome), scenario, &trial, |_| {})?;
+        Ok(Some(Finding {
+            genome: genome.clone(),
+            provenance: Provenance {
+                seed: Some(self.settings.seed),
+                generation: record.generation,
+                matched_bits: record.best_matches,
+                scored_bits: self.settings.scored_bits(),
+            },
+            repetition: record.worst_repetition,
+            starts: trial.starts,
+            hash: self.hash.end(genome, &outcome.final_poses),
+            outcome,
+        }))
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The generation to evaluate next.
+    #[must_use]
+    pub fn population(&self) -> &Population {
+        &self.population
+    }
+
+    /// The generations evaluated, in order.
+    #[must_use]
+    pub fn history(&self) -> &[GenerationRecord] {
+        &self.history
+    }
+
+    /// The hash of the generations evaluated.
+    #[must_use]
+    pub fn hash(&self) -> RunHash {
+        self.hash
+    }
+
+    /// Best genome of the last generation evaluated.
+    #[must_use]
+    pub fn best(&self) -> Option<&Genome> {
+        self.best.as_ref()
+    }
+}

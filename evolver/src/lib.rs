@@ -1,0 +1,16 @@
+//! Evolution of minimal-surprise swarms on the host: the genetic algorithm, experiments, run
+//! directories, and the command line `evolver`.
+//!
+//! Data flows one way: [`settings`] → [`evolution`] → [`experiment`] → [`checkpoint`] and
+//! [`run_dir`] → [`report`] → [`cli`].
+#![forbid(unsafe_code)]
+
+pub mod checkpoint;
+pub mod cli;
+pub mod evolution;
+pub mod experiment;
+pub mod files;
+pub mod report;
+pub mod run_dir;
+pub mod run_hash;
+pub mod settings;

@@ -1,0 +1,7 @@
+//! The program `evolver`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    minimal_surprise_evolver::cli::main()
+}

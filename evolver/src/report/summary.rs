@@ -1,0 +1,151 @@
+//! Words and pictures for people at the end of a run, and about a genome.
+
+use crate::experiment::{Experiment, Finding};
+use crate::settings::{describe, model_name};
+use console::Term;
+use minimal_surprise_controller::codec::FORMAT_VERSION;
+use minimal_surprise_controller::network::Shape;
+use minimal_surprise_controller::{EncodedGenome, KERNEL_ID};
+use minimal_surprise_sim::drawing::draw;
+use minimal_surprise_sim::{Grid, Pose};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Columns and rows of the picture when the output is not a terminal.
+const WITHOUT_TERMINAL: (u16, u16) = (120, 60);
+
+/// How this program was called, for commands that people can copy.
+#[must_use]
+pub fn program() -> &'static str {
+    if std::env::var_os("CARGO").is_some() {
+        "cargo run --release --"
+    } else {
+        "evolver"
+    }
+}
+
+/// The swarm's picture, two columns a cell; where it does not fit, a line that says so.
+#[must_use]
+pub fn picture(grid: Grid, poses: &[Pose]) -> String {
+    let (rows, columns) = Term::stdout()
+        .size_checked()
+        .unwrap_or((WITHOUT_TERMINAL.1, WITHOUT_TERMINAL.0));
+    if 2 * u32::from(grid.width()) > u32::from(columns) || grid.height() > 4 * rows {
+        return format!("(a {grid} grid is too large for this terminal to be drawn)");
+    }
+    draw(grid, poses)
+        .lines()
+        .map(|row| {
+            let cells: Vec<String> = row.chars().map(String::from).collect();
+            format!("  {}", cells.join(" "))
+        })
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+/// What an evolution came to, and what to do next.
+#[must_use]
+pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> String {
+    let settings = experiment.settings();
+    let program = program();
+    let directory = directory.display();
+    format!(
+        "{picture}\n\n\
+         best fitness  {fitness:.4}  (generation {generation}, worst of {repetitions} repetitions)\n\
+         seed          {seed}\n\
+         hash          {hash}\n\
+         run           {directory}\n\n\
+         next:\n  \
+         look into the genome   {program} inspect {directory}/best.genome\n  \
+         evolve it further      {program} evolve --from {directory}/best.genome\n  \
+         the same run again     {program} evolve {directory}/config.toml\n",
+        picture = picture(settings.scenario.grid(), &finding.outcome.final_poses),
+        fitness = finding.outcome.fitness(),
+        generation = finding.provenance.generation,
+        repetitions = settings.repetitions,
+        seed = settings.seed,
+        hash = finding.hash,
+    )
+}
+
+/// Everything in a genome file.
+#[must_use]
+pub fn genome(encoded: &EncodedGenome<'_>, file_bytes: usize) -> String {
+    let topology = encoded.topology();
+    let provenance = encoded.provenance();
+    let weights: Vec<i16> = encoded.weights().collect();
+    let (action, prediction) = weights.split_at(topology.action_weights());
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:<19} {value}");
+    };
+    line(
+        "format",
+        format!("version {FORMAT_VERSION}, {file_bytes} bytes, CRC-32C correct"),
+    );
+    line("kernel", format!("{KERNEL_ID} (this program's)"));
+    line("sensor model", model_name(topology.model()).to_uppercase());
+    line("topology", describe(topology));
+    let fixed: Vec<String> = (0..topology.sensors())
+        .filter(|&sensor| !topology.predicted().get(sensor))
+        .map(|sensor| format!("{sensor}={}", u8::from(topology.fixed().get(sensor))))
+        .collect();
+    if !fixed.is_empty() {
+        line("fixed predictions", fixed.join(" "));
+    }
+    line(
+        "evolved with",
+        provenance
+            .seed
+            .map_or("an unknown seed".to_owned(), |seed| format!("seed {seed}")),
+    );
+    line("generation", provenance.generation.to_string());
+    line(
+        "fitness",
+        match provenance.scored_bits {
+            0 => "unknown".to_owned(),
+            bits => format!(
+                "{:.4} ({} of {bits} bits)",
+                provenance.matched_bits as f64 / bits as f64,
+                provenance.matched_bits
+            ),
+        },
+    );
+    network(&mut text, "action network", topology.action_shape(), action);
+    match topology.prediction_shape() {
+        Some(shape) => network(&mut text, "prediction network", shape, prediction),
+        None => {
+            let _ = writeln!(
+                text,
+                "\nprediction network  none: all predictions are fixed"
+            );
+        }
+    }
+    text
+}
+
+/// A table of one network's weights.
+fn network(text: &mut String, name: &str, shape: Shape, weights: &[i16]) {
+    let sizes = format!("{}-{}-{}", shape.inputs(), shape.hidden(), shape.outputs());
+    let _ = writeln!(text, "\n{name:<19} {sizes}, {} weights", weights.len());
+    let _ = writeln!(
+        text,
+        "  layer     weights      min     mean      max   mean |w|  at the limit"
+    );
+    let (input, rest) = weights.split_at(2 * shape.inputs());
+    let (hidden, output) = rest.split_at(shape.hidden() * shape.hidden_row());
+    for (layer, weights) in [("input", input), ("hidden", hidden), ("output", output)] {
+        let value = |weight: i16| f64::from(weight) / 4096.0;
+        let count = weights.len() as f64;
+        let mean = weights.iter().map(|&w| value(w)).sum::<f64>() / count;
+        let mean_size = weights.iter().map(|&w| value(w).abs()).sum::<f64>() / count;
+        let min = weights.iter().copied().min().map_or(0.0, value);
+        let max = weights.iter().copied().max().map_or(0.0, value);
+        let limit = weights.iter().filter(|w| w.unsigned_abs() == 32767).count();
+        let _ = writeln!(
+            text,
+            "  {layer:<8} {:>8} {min:>8.3} {mean:>8.3} {max:>8.3} {mean_size:>10.3} {limit:>13}",
+            weights.len()
+        );
+    }
+}

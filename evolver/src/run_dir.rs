@@ -1,0 +1,237 @@
+//! Run directories: everything a run leaves behind.
+//!
+//! | file | content |
+//! |---|---|
+//! | `config.toml` | the settings, resolved, with the seed |
+//! | `meta.json` | schema version, seed, program, revision, compiler, command line |
+//! | `generations.csv` | a line a generation |
+//! | `best.genome` | the last generation's best genome |
+//! | `final.json` | where it started from and ended, fitness, average predictions |
+//! | `DONE` | the run's hash; the run is complete |
+//! | `checkpoint` | until the run is complete: where it goes on |
+//!
+//! No directory is used twice, and no file in it is ever half-written.
+
+use crate::checkpoint::{self, CheckpointError};
+use crate::experiment::{Experiment, Finding};
+use crate::files::{self, FileError};
+use crate::report::tables;
+use crate::settings::{Given, SettingError, Settings};
+use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
+use std::fs::{self, File, TryLockError};
+use std::path::{Path, PathBuf};
+
+/// A run directory, held by this process alone.
+#[derive(Debug)]
+pub struct RunDir {
+    path: PathBuf,
+    settings_text: String,
+    /// Holds the lock for as long as it lives.
+    _lock: Option<File>,
+}
+
+/// A run directory cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum RunDirError {
+    /// There is something already; nothing is ever overwritten.
+    #[error("{} exists; name a directory that does not, or continue with --resume", .0.display())]
+    Exists(PathBuf),
+    /// The directory holds no run.
+    #[error("{} is not a run directory: it has no {missing}", path.display())]
+    NotARun {
+        /// The directory.
+        path: PathBuf,
+        /// The file that it should have.
+        missing: &'static str,
+    },
+    /// Another process is at it.
+    #[error("another process is working in {}", .0.display())]
+    InUse(PathBuf),
+    /// A file cannot be used.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The settings in it are wrong.
+    #[error(transparent)]
+    Settings(#[from] SettingError),
+    /// The checkpoint in it cannot be continued from.
+    #[error("{}: {error}", path.display())]
+    Checkpoint {
+        /// The checkpoint.
+        path: PathBuf,
+        /// Why.
+        error: CheckpointError,
+    },
+}
+
+impl RunDirError {
+    /// Whether the user gave something that cannot be used, as opposed to something that broke.
+    #[must_use]
+    pub fn is_bad_input(&self) -> bool {
+        !matches!(self, Self::File(_))
+    }
+}
+
+const LOCK: &str = ".lock";
+const CHECKPOINT: &str = "checkpoint";
+const CONFIG: &str = "config.toml";
+const META: &str = "meta.json";
+const GENERATIONS: &str = "generations.csv";
+const BEST: &str = "best.genome";
+const FINAL: &str = "final.json";
+const DONE: &str = "DONE";
+
+/// What `--resume` finds.
+#[derive(Debug)]
+pub enum Found {
+    /// A run to go on with.
+    Unfinished(Box<Experiment>, RunDir),
+    /// A run that is complete, with its hash.
+    Finished(String),
+}
+
+impl RunDir {
+    /// Makes the directory and everything that a run needs to be continued.
+    ///
+    /// # Errors
+    /// [`RunDirError::Exists`], or a file that cannot be written.
+    pub fn create(path: &Path, experiment: &Experiment) -> Result<Self, RunDirError> {
+        if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
+            fs::create_dir_all(parent).map_err(FileError::at(parent))?;
+        }
+        match fs::create_dir(path) {
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+                return Err(RunDirError::Exists(path.to_owned()));
+            }
+            other => other.map_err(FileError::at(path))?,
+        }
+        let settings_text = toml::to_string(&experiment.settings().written)
+            .expect("settings are plain numbers and strings");
+        let run = Self {
+            path: path.to_owned(),
+            settings_text,
+            _lock: lock(path)?,
+        };
+        run.save(experiment)?;
+        let meta = tables::meta(experiment.settings());
+        files::replace(&run.file(META), meta.as_bytes())?;
+        files::replace(&run.file(CONFIG), run.settings_text.as_bytes())?;
+        Ok(run)
+    }
+
+    /// [`RunDir::create`] under a name made of the settings; a number is added if there is one
+    /// already.
+    ///
+    /// # Errors
+    /// [`RunDirError`] if nothing can be written.
+    pub fn create_named(parent: &Path, experiment: &Experiment) -> Result<Self, RunDirError> {
+        let name = experiment.settings().run_name();
+        for number in 1_u32.. {
+            let name = match number {
+                1 => name.clone(),
+                _ => format!("{name}-{number}"),
+            };
+            match Self::create(&parent.join(name), experiment) {
+                Err(RunDirError::Exists(_)) => {}
+                other => return other,
+            }
+        }
+        Err(RunDirError::Exists(parent.join(name)))
+    }
+
+    /// Opens a run to go on with it.
+    ///
+    /// # Errors
+    /// [`RunDirError`] if there is no run, it is in use, or it was changed or damaged.
+    pub fn open(path: &Path) -> Result<Found, RunDirError> {
+        let missing = |missing| RunDirError::NotARun {
+            path: path.to_owned(),
+            missing,
+        };
+        let config = path.join(CONFIG);
+        if !config.is_file() {
+            return Err(missing(CONFIG));
+        }
+        if path.join(DONE).is_file() {
+            let hash = String::from_utf8_lossy(&files::read(&path.join(DONE))?)
+                .trim()
+                .to_owned();
+            return Ok(Found::Finished(hash));
+        }
+        let lock = lock(path)?;
+        let checkpoint = path.join(CHECKPOINT);
+        if !checkpoint.is_file() {
+            return Err(missing(CHECKPOINT));
+        }
+        let mut given = Given::default();
+        given.file(&config)?;
+        // The first population is in the checkpoint; its ancestor need not exist any more.
+        given.forget("from");
+        let settings = Settings::resolve(&given, || 0)?;
+        let settings_text = String::from_utf8_lossy(&files::read(&config)?).into_owned();
+        let bytes = files::read(&checkpoint)?;
+        let experiment = checkpoint::decode(&bytes, settings, &settings_text).map_err(|error| {
+            RunDirError::Checkpoint {
+                path: checkpoint,
+                error,
+            }
+        })?;
+        let run = Self {
+            path: path.to_owned(),
+            settings_text,
+            _lock: lock,
+        };
+        Ok(Found::Unfinished(Box::new(experiment), run))
+    }
+
+    /// Saves an evolution between two generations.
+    ///
+    /// # Errors
+    /// [`FileError`] if a file cannot be written; the last checkpoint is then still there.
+    pub fn save(&self, experiment: &Experiment) -> Result<(), FileError> {
+        let bytes = checkpoint::encode(experiment, &self.settings_text);
+        files::replace(&self.file(CHECKPOINT), &bytes)?;
+        let table = tables::generations(experiment);
+        files::replace(&self.file(GENERATIONS), table.as_bytes())
+    }
+
+    /// Saves the result and marks the run complete.
+    ///
+    /// # Errors
+    /// [`FileError`] if a file cannot be written; the run can then be resumed.
+    pub fn finish(&self, experiment: &Experiment, finding: &Finding) -> Result<(), FileError> {
+        let mut buffer = [0; CONTAINER_BYTES_MAX];
+        let genome = codec::encode(&finding.genome, finding.provenance, &mut buffer)
+            .expect("the buffer holds any genome");
+        files::replace(&self.file(BEST), genome)?;
+        let final_state = tables::final_state(experiment.settings(), finding);
+        files::replace(&self.file(FINAL), final_state.as_bytes())?;
+        files::replace(&self.file(DONE), format!("{}\n", finding.hash).as_bytes())?;
+        for name in [CHECKPOINT, LOCK] {
+            let path = self.file(name);
+            fs::remove_file(&path).map_err(FileError::at(&path))?;
+        }
+        Ok(())
+    }
+
+    /// The directory.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+}
+
+/// Takes the directory for this process, where the file system knows locks; where it does not,
+/// there is none to take.
+fn lock(directory: &Path) -> Result<Option<File>, RunDirError> {
+    let path = directory.join(LOCK);
+    let file = File::create(&path).map_err(FileError::at(&path))?;
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => Err(RunDirError::InUse(directory.to_owned())),
+        Err(TryLockError::Error(_)) => Ok(None),
+    }
+}

@@ -1,0 +1,487 @@
+//! The command line, run as a user would run it.
+
+use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX, CRC_32C};
+use minimal_surprise_controller::{
+    EncodedGenome, Genome, KERNEL_ID, Prediction, Provenance, SensorModel, Topology,
+};
+use std::fs;
+use std::time::Duration;
+use tests::program::{Evolver, Finished};
+
+/// Flags of an evolution that takes a moment.
+const SHORT: [(&str, &str); 6] = [
+    ("--robots", "12"),
+    ("--grid", "7x6"),
+    ("--steps", "20"),
+    ("--population", "4"),
+    ("--repetitions", "2"),
+    ("--generations", "3"),
+];
+
+/// A short evolution with more flags, which go before those of the same name.
+fn short(flags: &[&str]) -> Vec<String> {
+    let defaults = SHORT.iter().filter(|(flag, _)| !flags.contains(flag));
+    let defaults = defaults.flat_map(|&(flag, value)| [flag, value]);
+    ["evolve"]
+        .into_iter()
+        .chain(defaults)
+        .chain(flags.iter().copied())
+        .map(str::to_owned)
+        .collect()
+}
+
+/// Refused with one message that has all these words, exit code 2, and nothing written.
+fn assert_refused(evolver: &Evolver, arguments: &[String], words: &[&str]) {
+    let before = evolver.files();
+    let run = evolver.run(arguments);
+    assert_eq!(run.code, Some(2), "{arguments:?}: {run:?}");
+    for word in words {
+        assert!(
+            run.stderr.contains(word),
+            "{arguments:?}: no {word:?} in {run:?}"
+        );
+    }
+    assert_eq!(evolver.files(), before, "{arguments:?} wrote something");
+}
+
+fn container(topology: Topology) -> Vec<u8> {
+    let mut buffer = [0; CONTAINER_BYTES_MAX];
+    let genome = Genome::zeroed(topology);
+    codec::encode(&genome, Provenance::default(), &mut buffer)
+        .unwrap()
+        .to_vec()
+}
+
+fn hash_of(run: &Finished) -> &str {
+    let line = run.stdout.lines().find(|line| line.starts_with("hash"));
+    line.and_then(|line| line.split_whitespace().nth(1))
+        .unwrap_or_else(|| panic!("no hash in {run:?}"))
+}
+
+#[test]
+fn an_evolution_ends_with_a_picture_a_hash_and_a_genome_and_can_be_repeated_from_its_seed() {
+    let evolver = Evolver::in_empty_folder();
+    let first = evolver.run(&short(&["--out", "first"]));
+    assert_eq!(first.code, Some(0), "{first:?}");
+    let arrows = first.stdout.chars().filter(|c| "▶▲◀▼".contains(*c)).count();
+    assert_eq!(arrows, 12);
+    let seed = first.stdout.lines().next().unwrap();
+    let seed = seed.split_whitespace().nth(1).unwrap();
+
+    let second = evolver.run(&short(&["--seed", seed, "--out", "second"]));
+    assert_eq!(hash_of(&first), hash_of(&second));
+    let genome = evolver.read("first/best.genome");
+    assert_eq!(genome, evolver.read("second/best.genome"));
+    let encoded = EncodedGenome::decode(&genome).unwrap();
+    assert_eq!(encoded.provenance().seed, Some(seed.parse().unwrap()));
+    assert_eq!(encoded.provenance().generation, 2);
+
+    let again = evolver.run(&["evolve", "first/config.toml", "--out", "third"]);
+    assert_eq!(hash_of(&first), hash_of(&again));
+}
+
+#[test]
+fn a_run_directory_holds_what_it_should() {
+    let evolver = Evolver::in_empty_folder();
+    let run = evolver.run(&short(&["--seed", "7", "--out", "run"]));
+    let names = [
+        "run/DONE",
+        "run/best.genome",
+        "run/config.toml",
+        "run/final.json",
+        "run/generations.csv",
+        "run/meta.json",
+    ];
+    assert_eq!(evolver.files(), names);
+    assert_eq!(evolver.text("run/DONE").trim(), hash_of(&run));
+    assert_eq!(evolver.text("run/generations.csv").lines().count(), 4);
+
+    let meta: serde_json::Value = serde_json::from_slice(&evolver.read("run/meta.json")).unwrap();
+    assert_eq!(meta["schema_version"], 1);
+    assert_eq!(meta["seed"], 7);
+    for key in ["program_version", "revision", "compiler"] {
+        assert!(
+            meta[key].as_str().is_some_and(|text| !text.is_empty()),
+            "{key}"
+        );
+    }
+    assert_eq!(meta["command_line"].as_array().unwrap().len(), 18);
+
+    let state: serde_json::Value = serde_json::from_slice(&evolver.read("run/final.json")).unwrap();
+    assert_eq!(state["schema_version"], 1);
+    assert_eq!(state["start"].as_array().unwrap().len(), 12);
+    assert_eq!(state["final"].as_array().unwrap().len(), 12);
+    assert_eq!(state["average_prediction"].as_array().unwrap().len(), 14);
+    let matches = state["matches"].as_f64().unwrap();
+    let bits = state["scored_bits"].as_f64().unwrap();
+    assert_eq!(bits, 12.0 * 20.0 * 14.0);
+    assert_eq!(state["fitness"].as_f64().unwrap(), matches / bits);
+}
+
+#[test]
+fn no_run_is_ever_overwritten() {
+    let evolver = Evolver::in_empty_folder();
+    for expected in ["runs/c-free-7x6-seed-5", "runs/c-free-7x6-seed-5-2"] {
+        let run = evolver.run(&short(&["--seed", "5"]));
+        assert!(run.stdout.contains(expected), "{run:?}");
+    }
+    let arguments = short(&["--seed", "6", "--out", "runs/c-free-7x6-seed-5"]);
+    assert_refused(&evolver, &arguments, &["--out", "exists", "--resume"]);
+    assert!(
+        evolver
+            .text("runs/c-free-7x6-seed-5/config.toml")
+            .contains("seed = 5")
+    );
+}
+
+#[test]
+fn bad_flags_get_one_message_with_the_flag_the_value_and_what_is_valid() {
+    let evolver = Evolver::in_empty_folder();
+    let cases: [(&[&str], &[&str]); 25] = [
+        (&["--grid", "2x15"], &["--grid", "2x15", "from 3 to"]),
+        (&["--grid", "15"], &["--grid", "15", "as in 15x15"]),
+        (&["--grid", "15x"], &["--grid", "15x"]),
+        (&["--robots", "0"], &["--robots", "0", "from 1 to 225"]),
+        (&["--robots", "226"], &["--robots", "226", "from 1 to 225"]),
+        (&["--robots", "-1"], &["--robots", "-1", "from 1 to 225"]),
+        (
+            &["--robots", "many"],
+            &["--robots", "many", "from 1 to 225"],
+        ),
+        (&["--grid", "9x9"], &["--robots", "9x9", "from 1 to 81"]),
+        (&["--generations", "0"], &["--generations", "0", "from 1"]),
+        (&["--population", "0"], &["--population", "0", "from 1"]),
+        (&["--repetitions", "0"], &["--repetitions", "0", "from 1"]),
+        (&["--steps", "0"], &["--steps", "0", "from 1"]),
+        (
+            &["--mutation", "1.1"],
+            &["--mutation", "1.1", "from 0 to 1"],
+        ),
+        (
+            &["--mutation", "-0.1"],
+            &["--mutation", "-0.1", "from 0 to 1"],
+        ),
+        (
+            &["--mutation", "nan"],
+            &["--mutation", "nan", "from 0 to 1"],
+        ),
+        (&["--noise", "2"], &["--noise", "2", "from 0 to 1"]),
+        (&["--noise", "inf"], &["--noise", "inf", "from 0 to 1"]),
+        (&["--noise", "x"], &["--noise", "x", "from 0 to 1"]),
+        (
+            &["--sensor-model", "d"],
+            &["--sensor-model", "d", "a, b and c"],
+        ),
+        (
+            &["--predefine", "ring"],
+            &["--predefine", "ring", "line, pair, square"],
+        ),
+        (
+            &["--predefine", "square", "--sensor-model", "b"],
+            &["--predefine", "square", "B"],
+        ),
+        (
+            &["--predefine-partly", "pair"],
+            &["--predefine-partly", "pair", "line on sensor model C only"],
+        ),
+        (
+            &["--predefine-partly", "line", "--sensor-model", "a"],
+            &["--predefine-partly", "line", "A"],
+        ),
+        (&["--seed", "-3"], &["--seed", "-3", "from 0 to"]),
+        (&["--threads", "0"], &["--threads", "0", "from 1"]),
+    ];
+    for (flags, words) in cases {
+        let arguments: Vec<String> = ["evolve"].iter().chain(flags).map(|&w| w.into()).collect();
+        assert_refused(&evolver, &arguments, words);
+    }
+    assert_refused(
+        &evolver,
+        &[
+            "evolve",
+            "--predefine",
+            "line",
+            "--predefine-partly",
+            "line",
+        ]
+        .map(String::from),
+        &["--predefine", "--predefine-partly", "exclude"],
+    );
+    assert_refused(
+        &evolver,
+        &["evolve".into(), "--nosuch".into()],
+        &["--nosuch"],
+    );
+    assert_refused(
+        &evolver,
+        &["evolve", "--progress", "loud"].map(String::from),
+        &["loud", "auto", "none"],
+    );
+}
+
+#[test]
+fn bad_files_get_one_message_with_the_line_the_value_and_what_is_valid() {
+    let evolver = Evolver::in_empty_folder();
+    let cases = [
+        (
+            "robots = 12\nrobbots = 3\n",
+            ["line 2", "robbots", "sensor-model"],
+        ),
+        ("# swarm\ngrid = \"2x2\"\n", ["line 2", "grid", "from 3 to"]),
+        ("noise = nan\n", ["line 1", "noise", "from 0 to 1"]),
+        ("mutation = 1.5\n", ["line 1", "mutation", "from 0 to 1"]),
+        (
+            "robots = [1]\n",
+            ["line 1", "robots", "a number or a string"],
+        ),
+        ("robots = 1.5\n", ["line 1", "1.5", "whole number"]),
+        ("generations = 0\n", ["line 1", "generations", "from 1"]),
+        ("robots = \n", ["swarm.toml", "line 1", "robots"]),
+        (
+            "robots = 1\nrobots = 2\n",
+            ["swarm.toml", "line 2", "duplicate"],
+        ),
+        (
+            "predefine = \"line\"\npredefine-partly = \"line\"\n",
+            ["line 1", "line 2", "exclude"],
+        ),
+    ];
+    for (text, words) in cases {
+        evolver.write("swarm.toml", text.as_bytes());
+        assert_refused(&evolver, &["evolve".into(), "swarm.toml".into()], &words);
+    }
+    assert_refused(
+        &evolver,
+        &["evolve".into(), "missing.toml".into()],
+        &["missing.toml", "No such file"],
+    );
+}
+
+#[test]
+fn a_flag_goes_before_the_file() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.write(
+        "swarm.toml",
+        b"robots = 1_2\nseed = 3\nsensor-model = \"b\"\nsteps = 0\n",
+    );
+    let mut arguments = vec!["evolve".to_owned(), "swarm.toml".to_owned()];
+    arguments.extend_from_slice(&short(&["--sensor-model", "a", "--out", "run"])[3..]);
+    assert_eq!(evolver.run(&arguments).code, Some(0));
+    let config = evolver.text("run/config.toml");
+    assert!(
+        config.contains("sensor-model = \"a\"") && config.contains("robots = 12"),
+        "{config}"
+    );
+}
+
+#[test]
+fn genomes_that_cannot_be_used_are_refused_with_the_reason() {
+    let evolver = Evolver::in_empty_folder();
+    let fitting = container(Topology::default());
+    evolver.write("truncated.genome", &fitting[..500]);
+    let model_a = Topology::new(SensorModel::A, Prediction::Free).unwrap();
+    evolver.write("a.genome", &container(model_a));
+    let mut other_kernel = fitting.clone();
+    let at = other_kernel
+        .windows(8)
+        .position(|window| window == KERNEL_ID.0)
+        .unwrap();
+    other_kernel[at] ^= 1;
+    let body = other_kernel.len() - 4;
+    let crc = CRC_32C.checksum(&other_kernel[..body]);
+    other_kernel[body..].copy_from_slice(&crc.to_le_bytes());
+    evolver.write("kernel.genome", &other_kernel);
+    evolver.write("text.genome", b"not a genome at all");
+
+    let from = |name: &str| short(&["--from", name]);
+    let truncated = ["--from", "truncated.genome", "too short", "500"];
+    assert_refused(&evolver, &from("truncated.genome"), &truncated);
+    assert_refused(
+        &evolver,
+        &from("a.genome"),
+        &["--from", "sensor model A", "sensor model C"],
+    );
+    assert_refused(
+        &evolver,
+        &from("kernel.genome"),
+        &["--from", "evolved for kernel"],
+    );
+    assert_refused(&evolver, &from("text.genome"), &["--from", "not a genome"]);
+    assert_refused(&evolver, &from("none.genome"), &["--from", "No such file"]);
+    for (name, word) in [
+        ("truncated.genome", "too short"),
+        ("kernel.genome", "evolved for kernel"),
+        ("none.genome", "No such file"),
+    ] {
+        assert_refused(&evolver, &["inspect".into(), name.into()], &[name, word]);
+    }
+}
+
+#[test]
+fn from_starts_with_the_genome_and_its_mutants() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.run(&short(&["--seed", "1", "--out", "first"]));
+    let flags = [
+        "--seed",
+        "2",
+        "--out",
+        "second",
+        "--mutation",
+        "0",
+        "--from",
+    ];
+    let flags = [&flags[..], &["first/best.genome"]].concat();
+    assert_eq!(evolver.run(&short(&flags)).code, Some(0));
+    let (first, second) = (
+        evolver.read("first/best.genome"),
+        evolver.read("second/best.genome"),
+    );
+    let weights = |bytes: &[u8]| EncodedGenome::decode(bytes).unwrap().to_genome();
+    assert_eq!(
+        weights(&first),
+        weights(&second),
+        "without mutation nothing changes"
+    );
+    assert!(
+        evolver
+            .text("second/config.toml")
+            .contains("first/best.genome")
+    );
+}
+
+#[test]
+fn an_output_directory_that_cannot_be_written_is_refused() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.write("file", b"");
+    assert_refused(&evolver, &short(&["--out", "file/run"]), &["--out", "file"]);
+    assert_refused(
+        &evolver,
+        &short(&["--out", "file"]),
+        &["--out", "file", "exists"],
+    );
+    assert_refused(
+        &evolver,
+        &short(&["--out", "/proc/run"]),
+        &["--out", "/proc"],
+    );
+}
+
+#[test]
+fn only_an_unchanged_run_is_resumed() {
+    let evolver = Evolver::in_empty_folder();
+    let resume = |name: &str| ["evolve".to_owned(), "--resume".to_owned(), name.to_owned()];
+    assert_refused(&evolver, &resume("none"), &["none", "not a run directory"]);
+
+    let done = evolver.run(&short(&["--seed", "1", "--out", "done"]));
+    let again = evolver.run(&resume("done"));
+    assert_eq!(again.code, Some(0));
+    assert!(again.stdout.contains(hash_of(&done)), "{again:?}");
+
+    let long = short(&["--seed", "1", "--generations", "100000", "--out", "cut"]);
+    let running = evolver.start(&long);
+    running.wait_for_lines(3);
+    let refused = evolver.run(&resume("cut"));
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.stderr.contains("another process"), "{refused:?}");
+    running.kill();
+
+    let config = evolver.text("cut/config.toml");
+    evolver.write(
+        "cut/config.toml",
+        config.replace("steps = 20", "steps = 21").as_bytes(),
+    );
+    assert_refused(
+        &evolver,
+        &resume("cut"),
+        &["config.toml is not what the run was started with"],
+    );
+    evolver.write("cut/config.toml", config.as_bytes());
+    let mut checkpoint = evolver.read("cut/checkpoint");
+    checkpoint[100] ^= 4;
+    evolver.write("cut/checkpoint", &checkpoint);
+    assert_refused(&evolver, &resume("cut"), &["cut/checkpoint", "damaged"]);
+    fs::remove_file(evolver.folder().join("cut/checkpoint")).unwrap();
+    assert_refused(&evolver, &resume("cut"), &["cut", "no checkpoint"]);
+    let flags = [&resume("cut")[..], &["--seed".to_owned(), "2".to_owned()]].concat();
+    assert_refused(
+        &evolver,
+        &flags,
+        &["--resume", "--seed", "cannot be used with"],
+    );
+}
+
+#[test]
+fn ctrl_c_ends_cleanly_and_says_how_to_go_on() {
+    let evolver = Evolver::in_empty_folder();
+    let arguments = |out| short(&["--seed", "9", "--generations", "2000", "--out", out]);
+    let whole = evolver.run(&arguments("whole"));
+    let running = evolver.start(&arguments("cut"));
+    running.wait_for_lines(1);
+    let stopped = running.interrupt(Duration::from_secs(60));
+    assert_eq!(stopped.code, Some(130), "{stopped:?}");
+    assert!(
+        stopped.stderr.contains("evolve --resume cut"),
+        "{stopped:?}"
+    );
+    let resumed = evolver.run(&["evolve", "--resume", "cut"]);
+    assert_eq!(hash_of(&resumed), hash_of(&whole));
+}
+
+#[test]
+fn progress_can_be_lines_json_or_nothing() {
+    let evolver = Evolver::in_empty_folder();
+    let lines = evolver.run(&short(&["--seed", "1", "--progress", "lines"]));
+    assert_eq!(lines.stderr.lines().count(), 3, "{lines:?}");
+    for word in ["generation 3/3", "best", "mean", "robot-steps/s", "left"] {
+        assert!(lines.stderr.contains(word), "{word}: {lines:?}");
+    }
+    let nothing = evolver.run(&short(&["--seed", "1", "--progress", "none"]));
+    assert_eq!(nothing.stderr, "");
+    let json = evolver.run(&short(&["--seed", "1", "--progress", "json"]));
+    let events: Vec<serde_json::Value> = json
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(events.len(), 4);
+    assert_eq!(events[2]["generation"], 2);
+    assert_eq!(events[3]["event"], "done");
+    assert_eq!(events[3]["hash"], hash_of(&lines));
+}
+
+#[test]
+fn inspect_shows_everything_in_a_genome() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.run(&short(&[
+        "--seed",
+        "77",
+        "--predefine-partly",
+        "line",
+        "--out",
+        "run",
+    ]));
+    let shown = evolver.run(&["inspect", "run/best.genome"]);
+    let kernel = KERNEL_ID.to_string();
+    for word in [
+        "version 1",
+        &kernel,
+        "line partly predefined",
+        "0=1 3=1 8=1 11=1",
+        "seed 77",
+        "generation          2",
+        "15-8-2, 166 weights",
+        "15-12-10, 342 weights",
+    ] {
+        assert!(shown.stdout.contains(word), "{word}: {shown:?}");
+    }
+}
+
+#[test]
+fn completions_are_printed_for_every_shell() {
+    let evolver = Evolver::in_empty_folder();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let printed = evolver.run(&["completions", shell]);
+        assert_eq!(printed.code, Some(0));
+        assert!(printed.stdout.contains("sensor-model"), "{shell}");
+    }
+}

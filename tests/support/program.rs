@@ -1,0 +1,240 @@
+//! Running the program `evolver` as a user would, in a folder of its own.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Mutex, OnceLock};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// How the program was built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Profile {
+    /// With debug assertions and overflow checks.
+    Debug,
+    /// Optimised.
+    Release,
+}
+
+/// Builds the program, once a process, and says where it is.
+///
+/// # Panics
+/// If it does not build.
+#[must_use]
+pub fn path(profile: Profile) -> PathBuf {
+    static DEBUG: OnceLock<PathBuf> = OnceLock::new();
+    static RELEASE: OnceLock<PathBuf> = OnceLock::new();
+    /// One build at a time, or they wait for each other anyway.
+    static BUILDING: Mutex<()> = Mutex::new(());
+    let built = match profile {
+        Profile::Debug => &DEBUG,
+        Profile::Release => &RELEASE,
+    };
+    let build = || {
+        let _one = BUILDING.lock();
+        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../Cargo.toml");
+        let mut build = escargot::CargoBuild::new()
+            .manifest_path(workspace)
+            .package("minimal-surprise-evolver")
+            .bin("evolver");
+        if profile == Profile::Release {
+            build = build.release();
+        }
+        let run = build.run().unwrap_or_else(|error| panic!("{error}"));
+        run.path().to_owned()
+    };
+    built.get_or_init(build).clone()
+}
+
+/// The program, in an empty folder that goes when this goes.
+#[derive(Debug)]
+pub struct Evolver {
+    folder: TempDir,
+    program: PathBuf,
+}
+
+/// A process that has ended.
+#[derive(Debug)]
+pub struct Finished {
+    /// Its exit code; none after a signal.
+    pub code: Option<i32>,
+    /// What it printed.
+    pub stdout: String,
+    /// What it said about itself.
+    pub stderr: String,
+}
+
+/// A process that is running.
+#[derive(Debug)]
+pub struct Running {
+    child: Child,
+    lines: Receiver<String>,
+}
+
+impl Evolver {
+    /// The release program, in an empty folder.
+    #[must_use]
+    pub fn in_empty_folder() -> Self {
+        Self::built(Profile::Release)
+    }
+
+    /// The program built this way, in an empty folder.
+    ///
+    /// # Panics
+    /// If there is no temporary folder to be had.
+    #[must_use]
+    pub fn built(profile: Profile) -> Self {
+        Self {
+            folder: TempDir::new().expect("a temporary folder"),
+            program: path(profile),
+        }
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    fn command(&self, arguments: &[impl AsRef<OsStr>]) -> Command {
+        let mut command = Command::new(&self.program);
+        command
+            .args(arguments)
+            .current_dir(self.folder())
+            .env_remove("CARGO")
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        command
+    }
+
+    /// Runs it to its end.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn run(&self, arguments: &[impl AsRef<OsStr>]) -> Finished {
+        let output = self
+            .command(arguments)
+            .output()
+            .expect("the program starts");
+        Finished {
+            code: output.status.code(),
+            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+        }
+    }
+
+    /// Starts it.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    #[must_use]
+    pub fn start(&self, arguments: &[impl AsRef<OsStr>]) -> Running {
+        let mut child = self.command(arguments).spawn().expect("the program starts");
+        let stderr = BufReader::new(child.stderr.take().expect("it is piped"));
+        let (sender, lines) = channel();
+        std::thread::spawn(move || {
+            for line in stderr.lines().map_while(Result::ok) {
+                if sender.send(line).is_err() {
+                    break;
+                }
+            }
+        });
+        Running { child, lines }
+    }
+
+    /// All files below the folder, in order.
+    #[must_use]
+    pub fn files(&self) -> Vec<String> {
+        let mut found = Vec::new();
+        let mut folders = vec![self.folder().to_owned()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
+                let path = entry.path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if let Ok(relative) = path.strip_prefix(self.folder()) {
+                    found.push(relative.to_string_lossy().into_owned());
+                }
+            }
+        }
+        found.sort();
+        found
+    }
+
+    /// Writes a file in the folder.
+    ///
+    /// # Panics
+    /// If it cannot be written.
+    pub fn write(&self, name: &str, contents: &[u8]) {
+        fs::write(self.folder().join(name), contents).unwrap_or_else(|e| panic!("{name}: {e}"));
+    }
+
+    /// Reads a file in the folder.
+    ///
+    /// # Panics
+    /// If it cannot be read.
+    #[must_use]
+    pub fn read(&self, name: &str) -> Vec<u8> {
+        fs::read(self.folder().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    /// Reads a file in the folder as text.
+    #[must_use]
+    pub fn text(&self, name: &str) -> String {
+        String::from_utf8_lossy(&self.read(name)).into_owned()
+    }
+}
+
+impl Running {
+    /// Waits until it has written so many lines to standard error, or has ended.
+    pub fn wait_for_lines(&self, count: usize) {
+        for _ in 0..count {
+            if self.lines.recv_timeout(Duration::from_secs(120)).is_err() {
+                return;
+            }
+        }
+    }
+
+    /// Kills it at once, if it has not ended; says whether it had ended well before.
+    ///
+    /// # Panics
+    /// If the operating system loses track of it.
+    pub fn kill(mut self) -> bool {
+        let ended = self.child.try_wait().expect("it is our child");
+        let _ = self.child.kill();
+        let status = self.child.wait().expect("it is our child");
+        ended.is_some() && status.success()
+    }
+
+    /// Sends it Ctrl-C and waits for its end.
+    ///
+    /// # Panics
+    /// If it does not end in time.
+    #[must_use]
+    pub fn interrupt(mut self, patience: Duration) -> Finished {
+        let id = self.child.id().to_string();
+        let sent = Command::new("kill").args(["-INT", &id]).status();
+        assert!(sent.is_ok_and(|status| status.success()), "kill -INT {id}");
+        let started = Instant::now();
+        let status = loop {
+            if let Some(status) = self.child.try_wait().expect("it is our child") {
+                break status;
+            }
+            assert!(started.elapsed() < patience, "it goes on after Ctrl-C");
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        let mut stdout = String::new();
+        if let Some(mut pipe) = self.child.stdout.take() {
+            let _ = pipe.read_to_string(&mut stdout);
+        }
+        Finished {
+            code: status.code(),
+            stdout,
+            stderr: self.lines.iter().collect::<Vec<_>>().join("\n"),
+        }
+    }
+}
