@@ -552,7 +552,7 @@ mod tests {
         );
         assert_eq!(
             error(&[("predefine", "square"), ("sensor-model", "a")]),
-            "--predefine = square: the template square does not exist for sensor model A"
+            "--predefine = square: the template square does not exist for sensor model A, only for C"
         );
         assert_eq!(
             error(&[("predefine", "line"), ("predefine-partly", "line")]),
