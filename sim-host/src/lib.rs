@@ -11,6 +11,7 @@
 pub mod damage;
 pub mod drawing;
 pub mod evaluation;
+pub mod exchange;
 pub mod metrics;
 pub mod noise;
 pub mod scenario;
