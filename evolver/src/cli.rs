@@ -1,11 +1,13 @@
 //! The command line: parse and hand over to a command.
 
+use crate::commands::BadInput;
 use crate::commands::classify::classify;
 use crate::commands::damage::{DamageArgs, damage};
 use crate::commands::evaluate::{EvaluateArgs, evaluate};
 use crate::commands::evolve::{EvolveArgs, evolve};
+use crate::commands::export::{ExportArgs, export};
+use crate::commands::import::{ImportArgs, import};
 use crate::commands::inspect::inspect;
-use crate::commands::BadInput;
 use crate::run_dir::RunDirError;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::PathBuf;
@@ -30,7 +32,7 @@ enum Command {
     Evolve(Box<EvolveArgs>),
     /// Name what a swarm formed, show which robots belong to it, and measure the run.
     Classify {
-        /// A run directory, a final.json, or a drawing of ▶ ▲ ◀ ▼ and ·.
+        /// A run directory, a final.json, an agent_trajectory, or a drawing of ▶ ▲ ◀ ▼ and ·.
         state: PathBuf,
         /// Print JSON.
         #[arg(long)]
@@ -40,6 +42,10 @@ enum Command {
     Evaluate(EvaluateArgs),
     /// Take a part of what a swarm formed away, or scatter it, and see what the swarm does.
     Damage(DamageArgs),
+    /// Write a run in the format of another program.
+    Export(ExportArgs),
+    /// Make genome files of the genome text of the program that the paper's authors published.
+    Import(ImportArgs),
     /// Show everything in a genome file.
     Inspect {
         /// The genome file.
@@ -62,6 +68,8 @@ pub fn main() -> ExitCode {
         Some(Command::Classify { state, json }) => classify(&state, json).map(done),
         Some(Command::Evaluate(arguments)) => evaluate(&arguments).map(done),
         Some(Command::Damage(arguments)) => damage(&arguments).map(done),
+        Some(Command::Export(arguments)) => export(&arguments).map(done),
+        Some(Command::Import(arguments)) => import(&arguments).map(done),
         Some(Command::Inspect { genome }) => inspect(&genome).map(done),
         Some(Command::Completions { shell }) => {
             let mut stdout = std::io::stdout();

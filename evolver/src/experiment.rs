@@ -5,6 +5,8 @@ use crate::run_hash::RunHash;
 use crate::settings::Settings;
 use minimal_surprise_controller::{Controller, Genome, Provenance};
 use minimal_surprise_sim::evaluation::{Evaluation, Outcome, evaluate, run};
+use minimal_surprise_sim::metrics::Measures;
+use minimal_surprise_sim::structures::{Structures, classify};
 use minimal_surprise_sim::{Pose, SeedTree, Trial, WorldError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -51,8 +53,23 @@ pub struct Finding {
     pub starts: Vec<Pose>,
     /// What the run came to.
     pub outcome: Outcome,
+    /// How it went.
+    pub measures: Measures,
+    /// What the swarm formed.
+    pub structures: Structures,
     /// The run's hash.
     pub hash: RunHash,
+}
+
+impl Finding {
+    /// Share of robots in the structure that the run is named after, 0 to 1.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        let names = self.structures.names();
+        names
+            .first()
+            .map_or(0.0, |&name| self.structures.share(name))
+    }
 }
 
 impl Experiment {
@@ -146,7 +163,11 @@ impl Experiment {
         let seeds = SeedTree::new(self.settings.seed);
         let scenario = &self.settings.scenario;
         let trial = scenario.trial(seeds, record.generation, record.worst_repetition);
-        let outcome = run(&Controller::new(genome), scenario, &trial, |_| {})?;
+        let mut measures =
+            Measures::starting_from(scenario.grid(), self.settings.topology, &trial.starts);
+        let outcome = run(&Controller::new(genome), scenario, &trial, |world| {
+            measures.observe(world);
+        })?;
         Ok(Some(Finding {
             genome: genome.clone(),
             provenance: Provenance {
@@ -158,6 +179,8 @@ impl Experiment {
             repetition: record.worst_repetition,
             starts: trial.starts,
             hash: self.hash.end(genome, &outcome.final_poses),
+            structures: classify(scenario.grid(), &outcome.final_poses)?,
+            measures,
             outcome,
         }))
     }

@@ -241,13 +241,7 @@ impl FinishedRun {
     /// [`WorldError`] if the starting poses do not fit the grid.
     pub fn replay(&self, observe: impl FnMut(&World)) -> Result<(), WorldError> {
         let controller = Controller::new(&self.genome);
-        run(
-            &controller,
-            &self.settings.scenario,
-            &self.trial(),
-            observe,
-        )
-        .map(|_| ())
+        run(&controller, &self.settings.scenario, &self.trial(), observe).map(|_| ())
     }
 
     /// The measures of the run.

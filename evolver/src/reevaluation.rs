@@ -179,7 +179,10 @@ mod tests {
 
     #[test]
     fn mean_and_median_of_odd_even_and_no_values() {
-        assert_eq!((mean(&[1.0, 2.0, 6.0]), median(&[6.0, 1.0, 2.0])), (3.0, 2.0));
+        assert_eq!(
+            (mean(&[1.0, 2.0, 6.0]), median(&[6.0, 1.0, 2.0])),
+            (3.0, 2.0)
+        );
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
         assert_eq!((mean(&[]), median(&[])), (0.0, 0.0));
     }

@@ -121,6 +121,13 @@ impl Given {
         }
     }
 
+    /// Adds a value that a flag would have had, unless one was given.
+    pub fn flag_if_missing(&mut self, key: &'static str, value: &str) {
+        if self.place(key).is_none() {
+            self.flag(key, Some(value));
+        }
+    }
+
     /// Adds the values of a TOML file, except those already given.
     ///
     /// # Errors
@@ -258,9 +265,8 @@ impl Settings {
         let grid = given.value("grid", default_grid, parse_grid)?;
         let robots = given.value("robots", 100, |text| count(text, grid.cells()))?;
         let steps = given.value("steps", 500, |text| count(text, u32::MAX))?;
-        let model = given.value("sensor-model", SensorModel::C, parse_model)?;
         let noise = given.value("noise", 0.0, probability)?;
-        let topology = resolve_topology(given, model)?;
+        let topology = resolve_topology(given)?;
         let partly_20x20 = matches!(topology.prediction(), Prediction::PartlyPredefined(_))
             && (grid.width(), grid.height()) == (20, 20);
         let default_mutation = if partly_20x20 { 0.3 } else { 0.1 };
@@ -300,7 +306,7 @@ impl Settings {
             written: Written {
                 grid: grid.to_string(),
                 robots,
-                sensor_model: model_name(model).to_owned(),
+                sensor_model: model_name(topology.model()).to_owned(),
                 noise,
                 predefine: template_name(false),
                 predefine_partly: template_name(true),
@@ -438,7 +444,12 @@ fn parse_template(text: &str) -> Result<Template, String> {
         })
 }
 
-fn resolve_topology(given: &Given, model: SensorModel) -> Result<Topology, SettingError> {
+/// The topology that the settings ask for.
+///
+/// # Errors
+/// [`SettingError`] if it does not exist.
+pub fn resolve_topology(given: &Given) -> Result<Topology, SettingError> {
+    let model = given.value("sensor-model", SensorModel::C, parse_model)?;
     let prediction = match (given.place("predefine"), given.place("predefine-partly")) {
         (Some(first), Some(second)) => {
             return Err(SettingError::Conflict {

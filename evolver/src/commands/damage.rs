@@ -20,13 +20,22 @@ pub struct DamageArgs {
     #[arg(long, value_name = "x0,y0,x1,y1", allow_hyphen_values = true)]
     area: String,
     /// Take the robots in the area away.
-    #[arg(long, required_unless_present = "reposition", conflicts_with = "reposition")]
+    #[arg(
+        long,
+        required_unless_present = "reposition",
+        conflicts_with = "reposition"
+    )]
     remove: bool,
     /// Put the robots in the area elsewhere.
     #[arg(long)]
     reposition: bool,
     /// Runs a row.
-    #[arg(long, value_name = "N", default_value = "20", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "20",
+        allow_hyphen_values = true
+    )]
     repeat: String,
     /// The structure to follow [default: the one that the run is named after].
     #[arg(long, value_name = "NAME")]
@@ -85,7 +94,10 @@ pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
 }
 
 fn corners(text: &str) -> Result<[u32; 4], String> {
-    let numbers: Option<Vec<u32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let numbers: Option<Vec<u32>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok())
+        .collect();
     numbers
         .and_then(|numbers| numbers.try_into().ok())
         .ok_or_else(|| "expected four cells from the south-west corner, as in 2,3,6,7".to_owned())

@@ -16,19 +16,44 @@ pub struct EvaluateArgs {
     /// The genome file.
     genome: PathBuf,
     /// New starts under each of the conditions.
-    #[arg(long, value_name = "N", default_value = "20", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "20",
+        allow_hyphen_values = true
+    )]
     starts: String,
     /// Grids, as in 15x15,20x20.
-    #[arg(long, value_name = "WxH,…", default_value = "15x15", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "WxH,…",
+        default_value = "15x15",
+        allow_hyphen_values = true
+    )]
     grid: String,
     /// Noise levels, as in 0,0.05.
-    #[arg(long, value_name = "P,…", default_value = "0", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "P,…",
+        default_value = "0",
+        allow_hyphen_values = true
+    )]
     noise: String,
     /// Swarm sizes, as in 50,100.
-    #[arg(long, value_name = "N,…", default_value = "100", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "N,…",
+        default_value = "100",
+        allow_hyphen_values = true
+    )]
     robots: String,
     /// Steps of a run.
-    #[arg(long, value_name = "N", default_value = "500", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "500",
+        allow_hyphen_values = true
+    )]
     steps: String,
     /// Root of all random numbers [default: the seed that the genome evolved with, else 0].
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
@@ -48,8 +73,8 @@ pub struct EvaluateArgs {
 pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     let path = arguments.genome.display();
     let bytes = files::read(&arguments.genome).map_err(BadInput::new)?;
-    let encoded = EncodedGenome::decode(&bytes)
-        .map_err(|error| BadInput::new(format!("{path}: {error}")))?;
+    let encoded =
+        EncodedGenome::decode(&bytes).map_err(|error| BadInput::new(format!("{path}: {error}")))?;
     let starts = flag("starts", &arguments.starts, |text| count(text, 1_000_000))?;
     let steps = flag("steps", &arguments.steps, |text| count(text, u32::MAX))?;
     let grids = list("grid", &arguments.grid, parse_grid)?;

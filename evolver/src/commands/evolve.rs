@@ -137,8 +137,7 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
         }
     };
     let stop = stop_on_ctrl_c()?;
-    thread_pool(threads)?
-        .install(|| generations(experiment, &run, arguments.progress, &stop))
+    thread_pool(threads)?.install(|| generations(experiment, &run, arguments.progress, &stop))
 }
 
 /// Evaluates the generations that are left, saving each, and reports.
@@ -195,4 +194,3 @@ fn stop_on_ctrl_c() -> Result<Arc<AtomicBool>, ctrlc::Error> {
     })?;
     Ok(stop)
 }
-

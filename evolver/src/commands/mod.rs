@@ -4,6 +4,8 @@ pub mod classify;
 pub mod damage;
 pub mod evaluate;
 pub mod evolve;
+pub mod export;
+pub mod import;
 pub mod inspect;
 
 /// Input that cannot be used, in one message.

@@ -21,8 +21,12 @@ pub struct Condition {
 #[must_use]
 pub fn name_counts(reruns: &[Rerun]) -> Vec<(Structure, f64)> {
     let count = |structure| {
-        let named = reruns.iter().filter(|rerun| rerun.names.contains(&structure));
-        named.map(|rerun| 1.0 / rerun.names.len() as f64).sum::<f64>()
+        let named = reruns
+            .iter()
+            .filter(|rerun| rerun.names.contains(&structure));
+        named
+            .map(|rerun| 1.0 / rerun.names.len() as f64)
+            .sum::<f64>()
     };
     let counts = Structure::ALL.map(|structure| (structure, count(structure)));
     counts.into_iter().filter(|&(_, n)| n > 0.0).collect()
@@ -45,7 +49,13 @@ fn orientation(reruns: &[Rerun]) -> String {
 #[must_use]
 pub fn conditions_text(conditions: &[Condition]) -> String {
     let mut table = super::table(&[
-        "grid", "robots", "noise", "mean fitness", "median", "structures", "lines",
+        "grid",
+        "robots",
+        "noise",
+        "mean fitness",
+        "median",
+        "structures",
+        "lines",
     ]);
     for condition in conditions {
         let values = fitnesses(&condition.reruns);
@@ -117,7 +127,13 @@ pub fn conditions_json(conditions: &[Condition], seed: u64) -> Value {
 #[must_use]
 pub fn resilience_text(structure: Structure, rows: &[ResilienceRow]) -> String {
     let mut table = super::table(&[
-        "", "runs", "robots", "fitness", "in structure, start", "end", "similarity",
+        "",
+        "runs",
+        "robots",
+        "fitness",
+        "in structure, start",
+        "end",
+        "similarity",
     ]);
     for row in rows {
         let value = |values: &[f64], scale: f64, decimals: usize| {

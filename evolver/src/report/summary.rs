@@ -1,12 +1,12 @@
 //! Words and pictures for people at the end of a run, and about a genome.
 
+use super::structures::{self, Classified};
 use crate::experiment::{Experiment, Finding};
 use crate::settings::{describe, model_name};
 use console::Term;
 use minimal_surprise_controller::codec::FORMAT_VERSION;
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{EncodedGenome, KERNEL_ID};
-use minimal_surprise_sim::structures::{Structures, classify};
 use minimal_surprise_sim::{Grid, Pose, drawing};
 use std::fmt::Write;
 use std::path::Path;
@@ -44,19 +44,30 @@ pub fn picture_with(grid: Grid, poses: &[Pose], sign: impl Fn(u32, &Pose) -> Str
 #[must_use]
 pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> String {
     let settings = experiment.settings();
+    let classified = Classified {
+        grid: settings.scenario.grid(),
+        poses: &finding.outcome.final_poses,
+        found: &finding.structures,
+        measures: Some(&finding.measures),
+    };
     let program = program();
     let directory = directory.display();
     format!(
         "{picture}\n\n\
+         structure     {structure}: {share:.0} % of the robots (filled arrows)\n\
          best fitness  {fitness:.4}  (generation {generation}, worst of {repetitions} repetitions)\n\
          seed          {seed}\n\
          hash          {hash}\n\
          run           {directory}\n\n\
          next:\n  \
+         measure the run        {program} classify {directory}\n  \
+         from other starts      {program} evaluate {directory}/best.genome\n  \
          look into the genome   {program} inspect {directory}/best.genome\n  \
          evolve it further      {program} evolve --from {directory}/best.genome\n  \
          the same run again     {program} evolve {directory}/config.toml\n",
-        picture = picture(settings.scenario.grid(), &finding.outcome.final_poses),
+        picture = structures::highlighted(&classified),
+        structure = structures::name(&finding.structures),
+        share = 100.0 * finding.share(),
         fitness = finding.outcome.fitness(),
         generation = finding.provenance.generation,
         repetitions = settings.repetitions,
