@@ -5,7 +5,8 @@
 //! a result.
 //!
 //! Data flows one way: [`torus`] → [`seed`] → [`noise`] → [`world`] → [`scenario`] → [`evaluation`] →
-//! [`trace`] → [`metrics`] → [`structures`].
+//! [`trace`] → [`metrics`] → [`structures`]. [`damage`] turns a final state into a new start; [`exchange`] reads
+//! and writes the text files of the authors' program, [`drawing`] draws swarms as text.
 #![forbid(unsafe_code)]
 
 pub mod damage;
