@@ -7,9 +7,7 @@ use minimal_surprise_sim::damage::{Damage, DamageError};
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::metrics::{Match, similarity};
 use minimal_surprise_sim::structures::{LineOrientation, Structure, classify};
-use minimal_surprise_sim::{
-    NoiseStream, Pose, Purpose, Scenario, SeedTree, Trial, WorldError, scenario,
-};
+use minimal_surprise_sim::{Pose, Scenario, SeedTree, Trial, WorldError};
 use rayon::prelude::*;
 
 /// What one run from a new start came to.
@@ -27,20 +25,6 @@ pub struct Rerun {
     pub final_poses: Vec<Pose>,
 }
 
-/// The trial of a new start: poses and noise from the seed tree's streams for re-evaluation.
-#[must_use]
-pub fn new_start(conditions: &Scenario, seeds: SeedTree, start: u32) -> Trial {
-    let stream = |purpose| seeds.stream(purpose, 0, start);
-    Trial {
-        starts: scenario::random_poses(
-            conditions.grid(),
-            conditions.robots(),
-            &mut stream(Purpose::ReevaluationStarts),
-        ),
-        noise: NoiseStream::new(stream(Purpose::ReevaluationNoise), conditions.noise()),
-    }
-}
-
 /// Runs a genome from so many new starts, in parallel.
 ///
 /// # Errors
@@ -55,7 +39,7 @@ pub fn rerun(
     (0..starts)
         .into_par_iter()
         .map(|start| {
-            let trial = new_start(conditions, seeds, start);
+            let trial = conditions.reevaluation(seeds, start);
             let outcome = run(&controller, conditions, &trial, |_| {})?;
             let found = classify(conditions.grid(), &outcome.final_poses)?;
             Ok(Rerun {
@@ -105,7 +89,7 @@ pub fn resilience(
     };
     let initial = row("initial run", vec![(*conditions, finished.trial())])?;
     let starts = (0..repeat)
-        .map(|start| (*conditions, new_start(conditions, seeds, start)))
+        .map(|start| (*conditions, conditions.reevaluation(seeds, start)))
         .collect();
     let starts = row("new starts", starts)?;
     let (name, times) = match damage {

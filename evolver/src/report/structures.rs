@@ -1,10 +1,9 @@
 //! What a swarm formed, as a picture and a table or as JSON.
 
-use super::summary::picture_with;
-use console::Style;
+use super::summary::picture;
 use minimal_surprise_sim::metrics::Measures;
 use minimal_surprise_sim::structures::{LineCounts, Structure, Structures};
-use minimal_surprise_sim::{Grid, Heading, Pose};
+use minimal_surprise_sim::{Grid, Pose};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
@@ -38,32 +37,18 @@ pub fn names_in_words(names: &[Structure]) -> String {
     }
 }
 
-/// The picture: robots of the structure that the run is named after as filled arrows, and coloured
-/// on a terminal; the others hollow.
+/// The picture: the robots of the structure that the run is named after stand out.
 #[must_use]
 pub fn highlighted(classified: &Classified<'_>) -> String {
-    let names = classified.found.names();
-    let member = Style::new().cyan().bold();
-    picture_with(classified.grid, classified.poses, |robot, pose| {
-        let inside = names
+    let Classified {
+        grid, poses, found, ..
+    } = *classified;
+    let names = found.names();
+    picture(grid, poses, |robot| {
+        names
             .iter()
-            .any(|&structure| classified.found.contains(structure, robot));
-        if inside {
-            let arrow = minimal_surprise_sim::drawing::arrow(pose.heading);
-            member.apply_to(arrow).to_string()
-        } else {
-            hollow(pose.heading).to_string()
-        }
+            .any(|&structure| found.contains(structure, robot))
     })
-}
-
-fn hollow(heading: Heading) -> char {
-    match heading {
-        Heading::East => '▷',
-        Heading::North => '△',
-        Heading::West => '◁',
-        Heading::South => '▽',
-    }
 }
 
 /// For people.
@@ -173,6 +158,7 @@ pub fn json(classified: &Classified<'_>) -> Value {
             "clusters": clusters.clusters().len(),
             "connections": clusters.connections(),
         },
+        "average_prediction": classified.measures.map(Measures::average_prediction),
         "measures": classified.measures.map(measures_json),
     })
 }
@@ -193,6 +179,5 @@ pub fn measures_json(measures: &Measures) -> Value {
         "period_steps": measures.period(),
         "temperature": measures.temperature(),
         "surprise": measures.surprise(),
-        "average_prediction": measures.average_prediction(),
     })
 }

@@ -3,11 +3,12 @@
 use super::structures::{self, Classified};
 use crate::experiment::{Experiment, Finding};
 use crate::settings::{describe, model_name};
-use console::Term;
+use console::{Style, Term};
 use minimal_surprise_controller::codec::FORMAT_VERSION;
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{EncodedGenome, KERNEL_ID};
-use minimal_surprise_sim::{Grid, Pose, drawing};
+use minimal_surprise_sim::drawing::draw_members;
+use minimal_surprise_sim::{Grid, Pose};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -24,19 +25,26 @@ pub fn program() -> &'static str {
     }
 }
 
-/// The swarm's picture, two columns a cell; where it does not fit, a line that says so.
+/// The swarm's picture, two columns a cell, members as filled arrows (coloured on a terminal), the
+/// others hollow; where it does not fit, a line that says so.
 #[must_use]
-pub fn picture_with(grid: Grid, poses: &[Pose], sign: impl Fn(u32, &Pose) -> String) -> String {
+pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> String {
     let (rows, columns) = Term::stdout().size_checked().unwrap_or(WITHOUT_TERMINAL);
     if 2 * u32::from(grid.width()) > u32::from(columns) || grid.height() > 4 * rows {
         return format!("(a {grid} grid is too large for this terminal to be drawn)");
     }
-    let mut cells = vec![drawing::EMPTY.to_string(); grid.cells() as usize];
-    for (robot, pose) in (0..).zip(poses) {
-        cells[grid.cell(pose.x, pose.y) as usize] = sign(robot, pose);
-    }
-    let rows = cells.chunks(grid.width().into()).rev();
-    let lines: Vec<String> = rows.map(|row| format!("  {}", row.join(" "))).collect();
+    let member = Style::new().cyan().bold();
+    let cell = |cell: char| {
+        if "▶▲◀▼".contains(cell) {
+            format!(" {}", member.apply_to(cell))
+        } else {
+            format!(" {cell}")
+        }
+    };
+    let lines: Vec<String> = draw_members(grid, poses, is_member)
+        .lines()
+        .map(|row| format!(" {}", row.chars().map(cell).collect::<String>()))
+        .collect();
     lines.join("\n")
 }
 
