@@ -1,4 +1,6 @@
 //! What the integration tests share.
 
+pub mod firmware;
 pub mod golden;
 pub mod program;
+pub mod tools;

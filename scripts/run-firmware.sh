@@ -1,0 +1,9 @@
+#!/bin/sh
+# Runs a firmware program under QEMU and prints what it logs: scripts/run-firmware.sh ELF
+# Cargo's runner in firmware-example.
+set -eu
+
+elf=$(realpath "$1")
+cd "$(dirname "$0")/.."
+unset CARGO_BUILD_TARGET
+exec cargo run --quiet --package tests --bin run-firmware -- "$elf"
