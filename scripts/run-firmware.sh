@@ -5,5 +5,6 @@ set -eu
 
 elf=$(realpath "$1")
 cd "$(dirname "$0")/.."
-unset CARGO_BUILD_TARGET
+# What an outer cargo for the target has set is not for the host.
+unset CARGO_BUILD_TARGET RUSTC RUSTC_BOOTSTRAP
 exec cargo run --quiet --package tests --bin run-firmware -- "$elf"

@@ -2,7 +2,7 @@
 # Runs cargo for a Cortex-M4, e.g. in firmware-example:
 #
 #     ../scripts/thumb-cargo.sh build --release [--target thumbv7em-none-eabi]
-#     scripts/thumb-cargo.sh --compiler       only finds the compiler and names it
+#     scripts/thumb-cargo.sh --compiler [--target …]       only finds the compiler and names it
 #
 # The target's core library comes from the first of these that works:
 #
@@ -68,10 +68,10 @@ named() { say "compiler: $1, target $target"; }
 
 if has_target || add_target; then
     named "$(rustc --version)"
-    [ "$*" = --compiler ] || exec cargo "$@"
+    [ "${1:-}" = --compiler ] || exec cargo "$@"
 elif has_system_rust || provide_system_rust; then
     named "$(system rustc --version), core built from its source"
-    [ "$*" = --compiler ] || system cargo -Z build-std=core \
+    [ "${1:-}" = --compiler ] || system cargo -Z build-std=core \
         --config "target.$target.linker='ld.lld'" \
         --config "target.$target.rustflags=['-Clinker-flavor=ld.lld']" \
         "$@"

@@ -5,7 +5,6 @@
 //! instructions executed, not cycles: QEMU does not model a pipeline, and on the chip some
 //! instructions take more than one cycle.
 
-use core::hint::black_box;
 use core::sync::atomic::{Ordering, compiler_fence};
 use cortex_m::asm::nop;
 use cortex_m::peripheral::SYST;
@@ -70,7 +69,16 @@ impl Counter {
 /// Ten times the same.
 macro_rules! ten {
     ($work:expr) => {
-        $work; $work; $work; $work; $work; $work; $work; $work; $work; $work;
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
     };
 }
 use ten;
@@ -80,7 +88,7 @@ use ten;
 fn ticks(work: impl FnOnce()) -> u32 {
     let start = SYST::get_current();
     compiler_fence(Ordering::SeqCst);
-    black_box(work());
+    work();
     compiler_fence(Ordering::SeqCst);
     let end = SYST::get_current();
     start.wrapping_sub(end) & RELOAD

@@ -20,22 +20,10 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 /// The machine that `firmware-example/memory.x` describes, with a clock that advances by a fixed
 /// time an instruction.
 const QEMU: &str = "qemu-system-arm";
-const QEMU_ARGUMENTS: &[&str] = &[
-    "-cpu",
-    "cortex-m4",
-    "-machine",
-    "mps2-an386",
-    "-icount",
-    "shift=10,align=off,sleep=off",
-    "-nographic",
-    "-monitor",
-    "none",
-    "-serial",
-    "none",
-    "-semihosting-config",
-    "enable=on,target=native",
-    "-kernel",
-];
+const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 \
+    -icount shift=10,align=off,sleep=off \
+    -nographic -monitor none -serial none \
+    -semihosting-config enable=on,target=native -kernel";
 
 /// The built programs of `firmware-example`.
 pub struct Firmware {
@@ -60,8 +48,8 @@ pub fn directory() -> PathBuf {
 pub fn build() -> Result<Firmware, Missing> {
     let target_dir = directory().join("target");
     let output = Command::new(directory().join("../scripts/thumb-cargo.sh"))
-        .args(["build", "--release", "--locked", "--bins", "--target", TARGET])
-        .arg("--target-dir")
+        .args(["build", "--release", "--locked", "--bins"])
+        .args(["--target", TARGET, "--target-dir"])
         .arg(&target_dir)
         .current_dir(directory())
         .output()
@@ -93,7 +81,8 @@ impl Firmware {
         let mut lines = Vec::new();
         let status = run(&self.programs.join(program), |line| lines.push(line))?;
         let text = lines.join("\n");
-        let status = status.unwrap_or_else(|error| panic!("{program}: {error}; it logged:\n{text}"));
+        let status =
+            status.unwrap_or_else(|error| panic!("{program}: {error}; it logged:\n{text}"));
         assert!(status.success(), "{program}: {status}; it logged:\n{text}");
         Ok(lines)
     }
@@ -106,7 +95,7 @@ impl Firmware {
 /// [`Missing`] if there is no QEMU; inside, whatever went wrong with the file, its log or QEMU.
 pub fn run(elf: &Path, line: impl FnMut(String)) -> Result<io::Result<ExitStatus>, Missing> {
     let child = Command::new(QEMU)
-        .args(QEMU_ARGUMENTS)
+        .args(QEMU_ARGUMENTS.split_whitespace())
         .arg(elf)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -144,7 +133,7 @@ fn follow(elf: &Path, child: &mut Child, mut line: impl FnMut(String)) -> io::Re
         }
     });
     let end = Instant::now() + TIMEOUT;
-    let overdue = || io::Error::new(io::ErrorKind::TimedOut, "still running when its time was up");
+    let overdue = || io::Error::new(io::ErrorKind::TimedOut, "it did not end in time");
     loop {
         match chunks.recv_timeout(end.saturating_duration_since(Instant::now())) {
             Ok(chunk) => decoder.received(&chunk),

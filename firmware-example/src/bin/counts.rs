@@ -12,9 +12,7 @@ use defmt::println;
 use firmware_example::board;
 use firmware_example::instructions::Counter;
 use firmware_example::parity::{MUTATIONS, SEED, draw_genome, draw_sensors};
-use minimal_surprise_controller::{
-    Controller, Decision, SensorBits, State, Topology, activate,
-};
+use minimal_surprise_controller::{Controller, Decision, SensorBits, State, Topology, activate};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
@@ -37,7 +35,10 @@ fn main() -> ! {
         black_box(values);
         most = most.max(instructions);
     }
-    println!("14 activations: {=u32} instructions at most, of {=u32} sets of inputs", most, INPUT_SETS);
+    println!(
+        "14 activations: {=u32} instructions at most, of {=u32} sets of inputs",
+        most, INPUT_SETS
+    );
 
     let topology = Topology::default();
     let (mut most, mut steps) = (0, 0);
@@ -54,7 +55,10 @@ fn main() -> ! {
             steps += 1;
         }
     }
-    println!("one control step: {=u32} instructions at most, of {=u32} steps", most, steps);
+    println!(
+        "one control step: {=u32} instructions at most, of {=u32} steps",
+        most, steps
+    );
     board::succeed()
 }
 
