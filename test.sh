@@ -92,6 +92,6 @@ say 'packages'
 cargo package --locked --workspace --exclude tests --allow-dirty --no-verify
 
 say 'tests'
-cargo test --locked --workspace --all-features
+cargo test --locked --workspace --all-features -- --show-output
 
 say 'everything passed'
