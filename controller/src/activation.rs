@@ -39,12 +39,12 @@ pub const SEGMENTS: [[i16; 4]; 8] = [
 const TAIL: i32 = 4095 << 3;
 
 /// One row per value of `z >> 16`, 0 … 15 and −16 … −1, so that no input needs a clamp, a bounds
-/// check or its magnitude: the coefficients of [`activate`], highest power first.
+/// check or its magnitude: what [`activate`] multiplies and adds, highest power first.
 ///
-/// For x < 0, z = 30·x has segment −1 − s and position −t, where −x has s and t. (A t of −½ would
-/// not fit, but only x = 0 and x = −32768 have that.) There, the row makes the first product, with
-/// −t, the negative of what it is for −x, the second with −t again equal, and the third its
-/// negative; what each `>>` truncates is made up for by a constant one less than its divisor.
+/// An x < 0 has the segment −1 − s and the position −t where −x has s and t. (Where t is −½, −t
+/// does not fit; only 0 and −32768 have such a t, and they need none.) With −t, its row gives the
+/// negative of the first result, then the second as it is, then the negative of the third; its
+/// constants hold the d − 1 of ⌊(d − 1 − a) / d⌋ = −⌊a / d⌋.
 static ROWS: [[i32; 4]; 32] = {
     let mut rows = [[0; 4]; 32];
     let mut segment = 0;
