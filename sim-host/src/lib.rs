@@ -6,9 +6,12 @@
 //!
 //! Data flows one way: [`torus`] → [`seed`] → [`noise`] → [`world`] → [`scenario`] → [`evaluation`] →
 //! [`trace`].
-#![forbid(unsafe_code)]
+//! [`engine`] computes the same evaluations faster, and is the only place with unsafe code: its
+//! folder `x86`.
+#![deny(unsafe_code)]
 
 pub mod drawing;
+pub mod engine;
 pub mod evaluation;
 pub mod noise;
 pub mod scenario;
@@ -17,6 +20,7 @@ pub mod torus;
 pub mod trace;
 pub mod world;
 
+pub use engine::{Engine, Evaluator, Path, TrialSet};
 pub use evaluation::{Evaluation, Outcome, evaluate, run};
 pub use noise::{NoiseRate, NoiseStream};
 pub use scenario::{Scenario, ScenarioError, Trial};
