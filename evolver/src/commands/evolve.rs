@@ -6,7 +6,8 @@ use crate::report::progress::{Progress, ProgressMode};
 use crate::report::summary;
 use crate::run_dir::{Found, RunDir};
 use crate::settings::{self, Given, SettingError, Settings};
-use clap::Args;
+use clap::{Args, ValueEnum};
+use minimal_surprise_sim::{Engine, Path as CodePath};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -74,6 +75,9 @@ pub struct EvolveArgs {
     /// How progress is shown.
     #[arg(long, value_enum, default_value_t)]
     progress: ProgressMode,
+    /// What evaluates; the result does not depend on it.
+    #[arg(long, value_enum, default_value_t)]
+    engine: EngineName,
 }
 
 impl EvolveArgs {
@@ -107,6 +111,25 @@ impl EvolveArgs {
     }
 }
 
+/// What evaluates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum EngineName {
+    /// The straight program.
+    Plain,
+    /// The fast one, by the best instructions that this processor has; the environment variable
+    /// MINIMAL_SURPRISE_PATH forces portable, avx2 or avx512.
+    #[default]
+    Fast,
+}
+
+/// How to run, whatever is run; no result depends on it.
+#[derive(Clone, Copy, Debug)]
+struct Manner {
+    progress: ProgressMode,
+    engine: Engine,
+    path: CodePath,
+}
+
 /// Evolves a swarm.
 ///
 /// # Errors
@@ -114,6 +137,14 @@ impl EvolveArgs {
 pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
     let given = arguments.given().map_err(BadInput::new)?;
     let threads = settings::threads(&given).map_err(BadInput::new)?;
+    let manner = Manner {
+        progress: arguments.progress,
+        engine: match arguments.engine {
+            EngineName::Plain => Engine::Plain,
+            EngineName::Fast => Engine::Fast,
+        },
+        path: CodePath::from_environment().map_err(BadInput::new)?,
+    };
     let (experiment, run) = match &arguments.resume {
         Some(directory) => match RunDir::open(directory)? {
             Found::Unfinished(experiment, run) => (*experiment, run),
@@ -137,18 +168,18 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
         }
     };
     let stop = stop_on_ctrl_c()?;
-    thread_pool(threads)?.install(|| generations(experiment, &run, arguments.progress, &stop))
+    thread_pool(threads)?.install(|| generations(experiment, &run, manner, &stop))
 }
 
 /// Evaluates the generations that are left, saving each, and reports.
 fn generations(
     mut experiment: Experiment,
     run: &RunDir,
-    mode: ProgressMode,
+    manner: Manner,
     stop: &AtomicBool,
 ) -> anyhow::Result<ExitCode> {
     let done = experiment.history().len() as u32;
-    let progress = Progress::start(mode, experiment.settings(), done);
+    let progress = Progress::start(manner.progress, experiment.settings(), done);
     while !experiment.is_finished() {
         if stop.load(Ordering::Relaxed) {
             progress.end();
@@ -157,7 +188,7 @@ fn generations(
             eprintln!("interrupted; go on with: {program} evolve --resume {directory}");
             return Ok(ExitCode::from(EXIT_INTERRUPTED));
         }
-        let record = experiment.advance();
+        let record = experiment.advance(manner.engine, manner.path);
         run.save(&experiment)?;
         progress.generation(&record);
     }
@@ -166,7 +197,7 @@ fn generations(
         .finding()?
         .ok_or_else(|| anyhow::anyhow!("an evolution has at least one generation"))?;
     run.finish(&experiment, &finding)?;
-    if mode == ProgressMode::Json {
+    if manner.progress == ProgressMode::Json {
         let done = serde_json::json!({
             "event": "done",
             "fitness": finding.outcome.fitness(),
