@@ -1,6 +1,7 @@
 //! The command line: parse and hand over to a command.
 
 use crate::commands::BadInput;
+use crate::commands::bench::bench;
 use crate::commands::classify::classify;
 use crate::commands::damage::{DamageArgs, damage};
 use crate::commands::evaluate::{EvaluateArgs, evaluate};
@@ -30,6 +31,12 @@ struct Cli {
 enum Command {
     /// Evolve a swarm, and leave its genome and everything about the run in a directory.
     Evolve(Box<EvolveArgs>),
+    /// Measure how fast this program is on this machine; takes less than a minute.
+    Bench {
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// Name what a swarm formed, show which robots belong to it, and measure the run.
     Classify {
         /// A run directory, a final.json, an agent_trajectory, or a drawing of ▶ ▲ ◀ ▼ and ·.
@@ -65,6 +72,7 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         None => evolve(&EvolveArgs::default()),
         Some(Command::Evolve(arguments)) => evolve(&arguments),
+        Some(Command::Bench { json }) => bench(json).map(done),
         Some(Command::Classify { state, json }) => classify(&state, json).map(done),
         Some(Command::Evaluate(arguments)) => evaluate(&arguments).map(done),
         Some(Command::Damage(arguments)) => damage(&arguments).map(done),

@@ -5,6 +5,7 @@
 //! [`run_dir`] → [`finished_run`] → [`reevaluation`] → [`report`] → [`commands`] → [`cli`].
 #![forbid(unsafe_code)]
 
+pub mod bench;
 pub mod checkpoint;
 pub mod cli;
 pub mod commands;

@@ -1,5 +1,6 @@
 //! One file a command: check what was given, do it, show it.
 
+pub mod bench;
 pub mod classify;
 pub mod damage;
 pub mod evaluate;

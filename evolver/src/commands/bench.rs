@@ -1,0 +1,60 @@
+//! `evolver bench`: how fast this program is on this machine.
+
+use super::BadInput;
+use crate::bench::{self, Report};
+use minimal_surprise_sim::Path;
+
+/// Measures and prints.
+///
+/// # Errors
+/// [`BadInput`] if the environment names a path that this processor does not have.
+pub fn bench(json: bool) -> anyhow::Result<()> {
+    let path = Path::from_environment().map_err(BadInput::new)?;
+    let report = bench::run(path, |what| {
+        if !json {
+            eprintln!("measuring: {what}");
+        }
+    })?;
+    if json {
+        println!("{}", serde_json::to_string(&report)?);
+    } else {
+        println!("{}", text(&report, path));
+    }
+    Ok(())
+}
+
+fn text(report: &Report, path: Path) -> String {
+    let millions = |speed: f64| format!("{:.1}", speed / 1e6);
+    let memory = report
+        .peak_rss_mb
+        .map_or("not told".to_owned(), |mb| format!("{mb:.1}"));
+    let rows = [
+        ("plain", millions(report.plain)),
+        ("fast", millions(report.fast)),
+        ("fast, 20x20", millions(report.fast_20x20)),
+        (
+            "fast, no shortcut of repeated states",
+            millions(report.fast_no_shortcut),
+        ),
+        ("fast, 10 % noise", millions(report.fast_noise)),
+        ("f32 program", millions(report.f32)),
+        ("fast over f32", format!("{:.1}", report.ratio_fast_f32)),
+        (
+            "two threads over two processes",
+            format!("{:.3}", report.threads_2_efficiency),
+        ),
+        (
+            "cost at 1,000,000 robots over 100",
+            format!("{:.2}", report.million_robots_over_100),
+        ),
+        ("memory of an evolution, MB", memory),
+    ];
+    let mut text = format!(
+        "path {}; speeds in million robot-steps a CPU-second, model C, 15x15\n",
+        path.name()
+    );
+    for (name, value) in rows {
+        text += &format!("\n{name:<38} {value:>8}");
+    }
+    text
+}
