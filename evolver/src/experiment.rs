@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// What a generation came to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GenerationRecord {
     /// Number of the generation, from 0.
     pub generation: u32,
@@ -26,6 +26,14 @@ pub struct GenerationRecord {
     pub best_slot: u32,
     /// The repetition that gave the best genome its fitness, its worst one.
     pub worst_repetition: u32,
+    /// Robot movement M in that repetition (paper, Eq. 4).
+    pub movement: f64,
+    /// Intended robot movement I in that repetition (paper, Eq. 5).
+    pub intended_movement: f64,
+    /// Structures that the repetition's final state is named after, `;` between them.
+    pub structure: String,
+    /// Share of robots in that structure, 0 to 1.
+    pub share: f64,
 }
 
 /// An evolution in progress.
@@ -65,11 +73,14 @@ impl Finding {
     /// Share of robots in the structure that the run is named after, 0 to 1.
     #[must_use]
     pub fn share(&self) -> f64 {
-        let names = self.structures.names();
-        names
-            .first()
-            .map_or(0.0, |&name| self.structures.share(name))
+        share_of_named(&self.structures)
     }
+}
+
+/// Share of robots in the structure that a state is named after; 0 if there is none.
+fn share_of_named(found: &Structures) -> f64 {
+    let names = found.names();
+    names.first().map_or(0.0, |&name| found.share(name))
 }
 
 impl Experiment {
@@ -131,16 +142,28 @@ impl Experiment {
             .collect();
         let matches: Vec<u64> = evaluations.iter().map(|e| e.matches).collect();
         let best = best_slot(&matches);
+        let worst_repetition = evaluations[best].worst_repetition;
+        let (motion, poses) = Evaluator::new(Engine::Fast, path).motion(
+            &self.population.ask()[best],
+            &trials,
+            worst_repetition,
+        );
+        let found = classify(scenario.grid(), &poses).expect("a world keeps its robots apart");
+        let names = found.names();
         let record = GenerationRecord {
             generation,
             best_matches: matches[best],
             total_matches: matches.iter().sum(),
             worst_matches: matches.iter().copied().min().unwrap_or(0),
             best_slot: best as u32,
-            worst_repetition: evaluations[best].worst_repetition,
+            worst_repetition,
+            movement: motion.movement(),
+            intended_movement: motion.intended_movement(),
+            structure: names.iter().map(|n| n.name()).collect::<Vec<_>>().join(";"),
+            share: share_of_named(&found),
         };
         self.hash = self.hash.generation(&matches);
-        self.history.push(record);
+        self.history.push(record.clone());
         self.best = Some(self.population.ask()[best].clone());
         if !self.is_finished() {
             self.population = self

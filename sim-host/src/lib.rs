@@ -28,7 +28,7 @@ pub mod world;
 pub use damage::{Area, Damage, DamageError};
 pub use engine::{Engine, Evaluator, Path, TrialSet};
 pub use evaluation::{Evaluation, Outcome, evaluate, run};
-pub use metrics::{Match, Measures, similarity};
+pub use metrics::{Match, Measures, Motion, similarity};
 pub use noise::{NoiseRate, NoiseStream};
 pub use scenario::{Scenario, ScenarioError, Trial};
 pub use seed::{Purpose, SeedTree};

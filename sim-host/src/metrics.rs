@@ -13,6 +13,80 @@ use minimal_surprise_controller::sensor::MAX_SENSORS;
 use minimal_surprise_controller::{Action, Decision, SensorBits, SensorModel, Topology};
 use std::collections::BTreeSet;
 
+/// How much the robots of a run moved and meant to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Motion {
+    grid: Grid,
+    robots: u32,
+    /// Of each step: robots that moved, and robots that went straight.
+    moved: Vec<u32>,
+    straight: Vec<u32>,
+}
+
+impl Motion {
+    /// A run of so many robots, no step done yet.
+    #[must_use]
+    pub fn new(grid: Grid, robots: u32) -> Self {
+        Self {
+            grid,
+            robots,
+            moved: Vec::new(),
+            straight: Vec::new(),
+        }
+    }
+
+    /// Takes in a step: robots that moved, and robots that went straight whether they could or not.
+    pub fn add_step(&mut self, moved: u32, straight: u32) {
+        self.moved.push(moved);
+        self.straight.push(straight);
+    }
+
+    /// Steps seen, T.
+    #[must_use]
+    pub fn steps(&self) -> u32 {
+        self.moved.len() as u32
+    }
+
+    /// Temperature T(t) = Mₓ(t) + M_y(t) of each step, with Mₓ(t) = 1/N Σₙ |xₙ(t) − xₙ(t+1)|, in
+    /// cells a step and robot, from 0 to 1. A move across the edge is one cell (paper, Eqs. 2–3).
+    #[must_use]
+    pub fn temperature(&self) -> Vec<f64> {
+        let moved = self.moved.iter();
+        moved
+            .map(|&n| ratio(n.into(), self.robots.into()))
+            .collect()
+    }
+
+    /// Robot movement M = 1/τ Σ T(t) over the last τ steps, in cells a step and robot, from 0 to 1
+    /// (paper, Eq. 4). τ is [`Motion::period`].
+    #[must_use]
+    pub fn movement(&self) -> f64 {
+        self.mean_over_period(&self.moved)
+    }
+
+    /// Intended robot movement I = 1/(N·τ) Σₙ Σₜ aₙ(t) over the last τ steps, aₙ(t) = 1 for a robot
+    /// that went straight whether it could or not, in cells a step and robot, from 0 to 1 (paper,
+    /// Eq. 5; its a is 1 where the networks' action value is 0). I ≥ M. τ is [`Motion::period`].
+    #[must_use]
+    pub fn intended_movement(&self) -> f64 {
+        self.mean_over_period(&self.straight)
+    }
+
+    /// τ = ⌈Lx·Ly / 2⌉ steps, at most the steps seen (paper, Sec. 2.1).
+    #[must_use]
+    pub fn period(&self) -> u32 {
+        self.grid.cells().div_ceil(2).min(self.steps())
+    }
+
+    /// Mean over robots and the last τ steps.
+    fn mean_over_period(&self, robots_of_steps: &[u32]) -> f64 {
+        let period = self.period();
+        let first = robots_of_steps.len() - period as usize;
+        let sum: u64 = robots_of_steps[first..].iter().map(|&n| u64::from(n)).sum();
+        ratio(sum, u64::from(self.robots) * u64::from(period))
+    }
+}
+
 /// What is known of a run after the steps seen so far.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Measures {
@@ -22,9 +96,8 @@ pub struct Measures {
     predictions: Vec<SensorBits>,
     /// Of each robot, bits mispredicted in the last step.
     mispredicted_now: Vec<u8>,
-    /// Of each step: robots that moved, robots that went straight, bits mispredicted.
-    moved: Vec<u32>,
-    straight: Vec<u32>,
+    motion: Motion,
+    /// Of each step: bits mispredicted.
     mispredicted: Vec<u64>,
     /// Of each sensor, how often it was predicted occupied.
     predicted_occupied: [u64; MAX_SENSORS],
@@ -40,8 +113,7 @@ impl Measures {
             poses: starts.to_vec(),
             predictions: vec![topology.fixed(); starts.len()],
             mispredicted_now: vec![0; starts.len()],
-            moved: Vec::new(),
-            straight: Vec::new(),
+            motion: Motion::new(grid, starts.len() as u32),
             mispredicted: Vec::new(),
             predicted_occupied: [0; MAX_SENSORS],
         }
@@ -88,11 +160,10 @@ impl Measures {
         // the edge.
         let moved = self.poses.iter().zip(poses);
         let moved = moved.filter(|(from, to)| (from.x, from.y) != (to.x, to.y));
-        self.moved.push(moved.count() as u32);
-        self.poses.copy_from_slice(poses);
-
         let straight = decisions.iter().filter(|d| d.action == Action::Straight);
-        self.straight.push(straight.count() as u32);
+        self.motion
+            .add_step(moved.count() as u32, straight.count() as u32);
+        self.poses.copy_from_slice(poses);
 
         // Noise also flips bits that the model has no sensor for.
         let sensed = self.model.mask().bits();
@@ -118,7 +189,7 @@ impl Measures {
     /// Steps seen, T.
     #[must_use]
     pub fn steps(&self) -> u32 {
-        self.moved.len() as u32
+        self.motion.steps()
     }
 
     /// Poses after the last step seen.
@@ -132,7 +203,7 @@ impl Measures {
     /// the template, or 0 (paper, Eq. 1).
     #[must_use]
     pub fn fitness(&self) -> f64 {
-        let bits = self.bits_per_step() * self.moved.len() as u64;
+        let bits = self.bits_per_step() * u64::from(self.steps());
         let mispredicted: u64 = self.mispredicted.iter().sum();
         ratio(bits - mispredicted, bits)
     }
@@ -141,38 +212,39 @@ impl Measures {
     /// occupied), of the predictions that count for the fitness (paper, Fig. 9).
     #[must_use]
     pub fn average_prediction(&self) -> Vec<f64> {
-        let readings = self.robots() * self.moved.len() as u64;
+        let readings = self.robots() * u64::from(self.steps());
         let counts = &self.predicted_occupied[..self.model.sensors()];
         counts.iter().map(|&count| ratio(count, readings)).collect()
     }
 
-    /// Temperature T(t) = Mₓ(t) + M_y(t) of each step, with Mₓ(t) = 1/N Σₙ |xₙ(t) − xₙ(t+1)|, in
-    /// cells a step and robot, from 0 to 1. A move across the edge is one cell (paper, Eqs. 2–3).
+    /// Temperature, movement and intended movement.
+    #[must_use]
+    pub fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    /// [`Motion::temperature`].
     #[must_use]
     pub fn temperature(&self) -> Vec<f64> {
-        let moved = self.moved.iter();
-        moved.map(|&n| ratio(n.into(), self.robots())).collect()
+        self.motion.temperature()
     }
 
-    /// Robot movement M = 1/τ Σ T(t) over the last τ steps, in cells a step and robot, from 0 to 1
-    /// (paper, Eq. 4). τ is [`Measures::period`].
+    /// [`Motion::movement`].
     #[must_use]
     pub fn movement(&self) -> f64 {
-        self.mean_over_period(&self.moved)
+        self.motion.movement()
     }
 
-    /// Intended robot movement I = 1/(N·τ) Σₙ Σₜ aₙ(t) over the last τ steps, aₙ(t) = 1 for a robot
-    /// that went straight whether it could or not, in cells a step and robot, from 0 to 1 (paper,
-    /// Eq. 5; its a is 1 where the networks' action value is 0). I ≥ M. τ is [`Measures::period`].
+    /// [`Motion::intended_movement`].
     #[must_use]
     pub fn intended_movement(&self) -> f64 {
-        self.mean_over_period(&self.straight)
+        self.motion.intended_movement()
     }
 
-    /// τ = ⌈Lx·Ly / 2⌉ steps, at most the steps seen (paper, Sec. 2.1).
+    /// [`Motion::period`].
     #[must_use]
     pub fn period(&self) -> u32 {
-        self.grid.cells().div_ceil(2).min(self.steps())
+        self.motion.period()
     }
 
     /// Surprise of the swarm in each step, 1/(N·R) Σₙ Σᵣ |pₙʳ(t) − sₙʳ(t)|, from 0 to 1. One minus
@@ -199,14 +271,6 @@ impl Measures {
     /// N·R.
     fn bits_per_step(&self) -> u64 {
         self.robots() * self.model.sensors() as u64
-    }
-
-    /// Mean over robots and the last τ steps.
-    fn mean_over_period(&self, robots_of_steps: &[u32]) -> f64 {
-        let period = self.period();
-        let first = robots_of_steps.len() - period as usize;
-        let sum: u64 = robots_of_steps[first..].iter().map(|&n| u64::from(n)).sum();
-        ratio(sum, self.robots() * u64::from(period))
     }
 }
 

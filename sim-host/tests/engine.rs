@@ -1,9 +1,10 @@
 //! The fast engine gives what the plain one gives, on every path that this processor has.
 
-use minimal_surprise_controller::{Genome, MutationRate, Topology};
+use minimal_surprise_controller::{Controller, Genome, MutationRate, Topology};
 use minimal_surprise_sim::seed::Stream;
 use minimal_surprise_sim::{
-    Engine, Evaluator, Grid, NoiseRate, Path, Purpose, Scenario, SeedTree, TrialSet, evaluate,
+    Engine, Evaluator, Grid, Measures, NoiseRate, Path, Purpose, Scenario, SeedTree, TrialSet,
+    evaluate, run,
 };
 use rand_core::Rng as _;
 
@@ -47,7 +48,22 @@ impl Case {
         let trials = TrialSet::new(scenario, topology.model(), trials);
         let genome = genome(topology, &mut seeds.stream(Purpose::InitialGenome, 0, 0));
         let expected = evaluate(&genome, &scenario, trials.trials());
+        let trial = &trials.trials()[0];
+        let mut measures = Measures::starting_from(grid, topology, &trial.starts);
+        let controller = Controller::new(&genome);
+        run(&controller, &scenario, trial, |world| {
+            measures.observe(world);
+        })
+        .unwrap();
         for path in Path::available() {
+            let (motion, final_poses) =
+                Evaluator::new(Engine::Fast, path).motion(&genome, &trials, 0);
+            assert_eq!(
+                (&motion, &final_poses[..]),
+                (measures.motion(), measures.poses()),
+                "seed {seed}, {topology:?}, {grid}, path {}",
+                path.name()
+            );
             for skips in [true, false] {
                 let mut fast = Evaluator::new(Engine::Fast, path).with_repeats_skipped(skips);
                 // Twice, as the second evaluation finds what the first has left.

@@ -90,7 +90,7 @@ pub fn final_state(settings: &Settings, finding: &Finding) -> String {
 }
 
 #[derive(Serialize)]
-struct GenerationRow {
+struct GenerationRow<'a> {
     generation: u32,
     best_fitness: f64,
     mean_fitness: f64,
@@ -99,9 +99,14 @@ struct GenerationRow {
     total_matches: u64,
     best_slot: u32,
     worst_repetition: u32,
+    movement: f64,
+    intended_movement: f64,
+    structure: &'a str,
+    share: f64,
 }
 
-/// `generations.csv`: a line a generation.
+/// `generations.csv`: a line a generation. Movement, structure and share are those of the best
+/// genome in the repetition that gave it its fitness.
 #[must_use]
 pub fn generations(experiment: &Experiment) -> String {
     let settings = experiment.settings();
@@ -117,6 +122,10 @@ pub fn generations(experiment: &Experiment) -> String {
             total_matches: record.total_matches,
             best_slot: record.best_slot,
             worst_repetition: record.worst_repetition,
+            movement: record.movement,
+            intended_movement: record.intended_movement,
+            structure: &record.structure,
+            share: record.share,
         };
         table
             .serialize(row)

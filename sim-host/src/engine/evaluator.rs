@@ -8,11 +8,14 @@ use super::lanes::{BLOCK_STEPS, Predictor};
 use super::network::PredictionWeights;
 use super::path::Path;
 use super::recording::{Recorder, Recording};
+use super::robot_word::{self, ACTION, POSITION};
 use super::skipping;
-use super::swarm::{Behaviour, Swarm};
+use super::swarm::{Behaviour, ROBOTS_AT_ONCE, Swarm};
 use super::window::WindowOrder;
 use crate::evaluation::{self, Evaluation};
+use crate::metrics::Motion;
 use crate::scenario::{Scenario, Trial};
+use crate::torus::Pose;
 use crate::world::check_poses;
 use minimal_surprise_controller::{Controller, Genome, SensorModel};
 use std::sync::OnceLock;
@@ -158,6 +161,46 @@ impl Evaluator {
             matches,
             worst_repetition,
         }
+    }
+
+    /// How the robots of one repetition move, and where they end: the world alone, without
+    /// predictions.
+    ///
+    /// # Panics
+    /// If the trials are for another sensor model, or there is no such repetition.
+    pub fn motion(
+        &mut self,
+        genome: &Genome,
+        trials: &TrialSet,
+        repetition: u32,
+    ) -> (Motion, Vec<Pose>) {
+        let order = &trials.order;
+        let controller = Controller::new(genome);
+        assert_eq!(genome.topology().model(), order.model());
+        self.actions.prepare(self.recorder.path, &controller, order);
+        let mut behaviour = Behaviour {
+            controller: &controller,
+            order,
+            actions: &mut self.actions,
+        };
+        let (robots, grid) = (trials.robots(), trials.scenario.grid());
+        let mut swarm = Swarm::default();
+        swarm.reset(grid, &trials.trials[repetition as usize].starts);
+        let mut flips = trials.flips(repetition as usize);
+        let mut inputs = vec![0; robots.next_multiple_of(ROBOTS_AT_ONCE)];
+        let mut motion = Motion::new(grid, robots as u32);
+        let mut before = swarm.state().to_vec();
+        for step in 0..trials.steps() {
+            let flips = flips.row(step, robots);
+            swarm.step(self.recorder.path, &mut behaviour, flips, &mut inputs);
+            let steps = before.iter().zip(swarm.state());
+            let moved = steps.filter(|(from, to)| (*from ^ *to) & POSITION != 0);
+            let moved = moved.count() as u32;
+            let straight = swarm.state().iter().filter(|word| *word & ACTION == 0);
+            motion.add_step(moved, straight.count() as u32);
+            before.copy_from_slice(swarm.state());
+        }
+        (motion, before.into_iter().map(robot_word::pose).collect())
     }
 
     fn count_matches(&mut self, genome: &Genome, trials: &TrialSet) {

@@ -11,7 +11,7 @@
 //! A turn is an addition at bit 29; what it carries out of bit 30 falls on the action, which is
 //! set anew in the same step. Two swarms are in the same state exactly if their words are equal.
 
-use crate::torus::Pose;
+use crate::torus::{Heading, Pose};
 
 const COORDINATE_BITS: u32 = 14;
 const COORDINATE: u32 = (1 << COORDINATE_BITS) - 1;
@@ -27,6 +27,15 @@ const _: () = assert!(crate::torus::SIDE_MAX == 1 << COORDINATE_BITS);
 /// A robot that has not moved yet.
 pub(super) fn from_pose(pose: Pose) -> u32 {
     position(pose.x.into(), pose.y.into()) | (pose.heading as u32) << HEADING_SHIFT
+}
+
+/// Where a robot is and which way it faces.
+pub(super) fn pose(word: u32) -> Pose {
+    Pose {
+        x: x(word) as u16,
+        y: y(word) as u16,
+        heading: Heading::from_low_bits(heading(word)),
+    }
 }
 
 /// Coordinates in their places.

@@ -1,0 +1,394 @@
+//! The commands that look at what has evolved, run as a user would run them.
+
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tests::program::{Evolver, Finished};
+
+/// A line of four, a pair, and two robots that are in nothing but dispersion.
+const DRAWING: &str = "
+    ▲········
+    ·········
+    ···▶▶◀◀··
+    ·········
+    ·········
+    ·▶◀······
+    ·········
+    ·······▼·
+    ·········
+";
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("fixtures/exchange")
+        .join(name)
+}
+
+fn fixture_text(name: &str) -> String {
+    fs::read_to_string(fixture(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// A folder with a short run in `run`.
+fn with_a_run(flags: &[&str]) -> Evolver {
+    let evolver = Evolver::in_empty_folder();
+    let short =
+        "evolve --population 6 --generations 3 --repetitions 2 --steps 60 --seed 4 --out run";
+    let arguments: Vec<&str> = short.split(' ').chain(flags.iter().copied()).collect();
+    let run = evolver.run(&arguments);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    evolver
+}
+
+fn json(run: &Finished) -> Value {
+    assert_eq!(run.code, Some(0), "{run:?}");
+    serde_json::from_str(&run.stdout).unwrap_or_else(|error| panic!("{error}: {run:?}"))
+}
+
+fn assert_refused(run: &Finished, words: &[&str]) {
+    assert_eq!(run.code, Some(2), "{run:?}");
+    for word in words {
+        assert!(run.stderr.contains(word), "no {word:?} in {run:?}");
+    }
+    assert_eq!(run.stderr.trim_end().lines().count(), 1, "{run:?}");
+}
+
+#[test]
+fn classify_names_what_a_drawing_shows_and_draws_the_members_filled() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.write("swarm.txt", DRAWING.as_bytes());
+    let shown = evolver.run(&["classify", "swarm.txt"]);
+    assert_eq!(shown.code, Some(0), "{shown:?}");
+    assert!(shown.stdout.contains("▶ ▶ ◀ ◀"), "{shown:?}");
+    assert!(
+        shown.stdout.contains("▷ ◁"),
+        "the pair is no member: {shown:?}"
+    );
+    assert!(
+        shown.stdout.contains("8 robots on 9x9: line\n"),
+        "{shown:?}"
+    );
+    let found = json(&evolver.run(&["classify", "swarm.txt", "--json"]));
+    assert_eq!(found["names"], serde_json::json!(["line"]));
+    assert_eq!(found["structures"]["line"]["robots"], 4);
+    assert_eq!(
+        found["structures"]["pair"]["members"]
+            .as_array()
+            .unwrap()
+            .len(),
+        2
+    );
+    assert_eq!(found["lines"]["horizontal"], 1);
+    assert_eq!(found["structures"]["random dispersion"]["share"], 0.25);
+}
+
+#[test]
+fn classify_measures_a_run_and_agrees_with_what_evolve_wrote() {
+    let evolver = with_a_run(&[]);
+    let found = json(&evolver.run(&["classify", "run", "--json"]));
+    let written: Value = serde_json::from_slice(&evolver.read("run/final.json")).unwrap();
+    assert_eq!(found["names"], written["names"]);
+    for key in ["movement", "intended_movement", "temperature", "surprise"] {
+        assert_eq!(found["measures"][key], written["measures"][key], "{key}");
+    }
+    assert_eq!(found["measures"]["fitness"], written["fitness"]);
+    assert_eq!(found["average_prediction"], written["average_prediction"]);
+    let state = json(&evolver.run(&["classify", "run/final.json", "--json"]));
+    assert_eq!(state["structures"], found["structures"]);
+    assert!(state["measures"].is_null());
+    let header = evolver.text("run/generations.csv");
+    let header = header.lines().next().unwrap();
+    for column in ["movement", "intended_movement", "structure", "share"] {
+        assert!(
+            header.split(',').any(|name| name == column),
+            "{column}: {header}"
+        );
+    }
+    let last = evolver.text("run/generations.csv");
+    let movement = written["measures"]["movement"].as_f64().unwrap();
+    let column = header
+        .split(',')
+        .position(|name| name == "movement")
+        .unwrap();
+    let cell = last.lines().last().unwrap().split(',').nth(column).unwrap();
+    assert_eq!(cell.parse::<f64>().unwrap(), movement);
+}
+
+#[test]
+fn states_that_cannot_be_are_refused_with_their_line() {
+    let evolver = Evolver::in_empty_folder();
+    let text = fixture_text("c/agent_trajectory");
+    let lines: Vec<&str> = text.lines().collect();
+    let changed = |line: usize, to: &str| {
+        let mut lines = lines.clone();
+        lines[line - 1] = to;
+        lines.join("\n")
+    };
+    let cases = [
+        (changed(7, lines[5]), vec!["line 7", "already"]),
+        (
+            changed(9, "0: 15, 2, 1, 0"),
+            vec!["line 9", "15", "outside"],
+        ),
+        (changed(9, "0: 3, 2, 1, 1"), vec!["line 9", "heading"]),
+        (changed(9, "0: 3, 2, 1"), vec!["line 9"]),
+        (changed(2, "Grid: 2, 15"), vec!["line 2", "from 3"]),
+        (lines[..150].join("\n"), vec!["line 151", "ends"]),
+    ];
+    for (text, mut words) in cases {
+        evolver.write("trajectory", text.as_bytes());
+        words.push("trajectory");
+        assert_refused(&evolver.run(&["classify", "trajectory"]), &words);
+    }
+    evolver.write("swarm.txt", "···\n·x·\n···\n".as_bytes());
+    assert_refused(
+        &evolver.run(&["classify", "swarm.txt"]),
+        &["swarm.txt", "row 1", "'x'"],
+    );
+    assert_refused(
+        &evolver.run(&["classify", "none"]),
+        &["none", "No such file"],
+    );
+}
+
+#[test]
+fn final_states_that_cannot_be_are_refused() {
+    let evolver = with_a_run(&[]);
+    let text = evolver.text("run/final.json");
+    let good: Value = serde_json::from_str(&text).unwrap();
+    let with = |change: &dyn Fn(&mut Value)| {
+        let mut state = good.clone();
+        change(&mut state);
+        evolver.write("final.json", state.to_string().as_bytes());
+        evolver.run(&["classify", "final.json"])
+    };
+    let first = good["final"][0].clone();
+    let refused = with(&|state| state["final"][1] = first.clone());
+    assert_refused(&refused, &["final.json", "robot 1", "robot 0"]);
+    let refused = with(&|state| state["final"][0][0] = 15.into());
+    assert_refused(&refused, &["final.json", "robot 0", "outside"]);
+    let refused = with(&|state| state["final"][0][2] = 4.into());
+    assert_refused(&refused, &["final.json", "heading 4", "line 1"]);
+    let refused = with(&|state| state["schema_version"] = 9.into());
+    assert_refused(&refused, &["final.json", "schema version 9"]);
+    evolver.write("final.json", &text.as_bytes()[..700]);
+    let refused = evolver.run(&["classify", "final.json"]);
+    assert_refused(&refused, &["final.json", "line"]);
+    fs::remove_file(evolver.folder().join("run/DONE")).unwrap();
+    assert_refused(&evolver.run(&["classify", "run"]), &["run", "no DONE"]);
+}
+
+#[test]
+fn evaluate_gives_a_table_over_grids_noise_levels_and_swarm_sizes() {
+    let evolver = with_a_run(&[]);
+    let arguments = "evaluate run/best.genome --starts 3 --steps 50 --grid 15x15,11x18 \
+        --noise 0,0.05 --robots 60,100 --json";
+    let arguments: Vec<&str> = arguments.split_whitespace().collect();
+    let table = json(&evolver.run(&arguments));
+    let rows = table["conditions"].as_array().unwrap();
+    assert_eq!(rows.len(), 8);
+    for row in rows {
+        let starts = row["starts"].as_array().unwrap();
+        let fitness: Vec<f64> = starts
+            .iter()
+            .map(|s| s["fitness"].as_f64().unwrap())
+            .collect();
+        let mean = fitness.iter().sum::<f64>() / 3.0;
+        assert!((row["mean_fitness"].as_f64().unwrap() - mean).abs() < 1e-12);
+        let mut sorted = fitness.clone();
+        sorted.sort_by(f64::total_cmp);
+        assert_eq!(row["median_fitness"].as_f64().unwrap(), sorted[1]);
+        let names: f64 = row["structures"]
+            .as_object()
+            .unwrap()
+            .values()
+            .map(|n| n.as_f64().unwrap())
+            .sum();
+        assert!(names <= 3.0 + 1e-9);
+    }
+    let one_thread = [&arguments[..], &["--threads", "1"]].concat();
+    assert_eq!(json(&evolver.run(&one_thread)), table);
+    let shown = evolver.run(&[
+        "evaluate",
+        "run/best.genome",
+        "--starts",
+        "2",
+        "--steps",
+        "20",
+    ]);
+    assert!(shown.stdout.contains("mean fitness"), "{shown:?}");
+}
+
+#[test]
+fn evaluate_refuses_what_cannot_be() {
+    let evolver = with_a_run(&[]);
+    let run = |flags: &[&str]| evolver.run(&[&["evaluate", "run/best.genome"], flags].concat());
+    assert_refused(&run(&["--starts", "0"]), &["--starts", "0", "from 1"]);
+    assert_refused(&run(&["--grid", "15x15,2x2"]), &["--grid", "2x2", "from 3"]);
+    assert_refused(
+        &run(&["--noise", "0,1.5"]),
+        &["--noise", "1.5", "from 0 to 1"],
+    );
+    assert_refused(
+        &run(&["--robots", "226"]),
+        &["--robots", "226", "from 1 to 225"],
+    );
+    assert_refused(&run(&["--steps", "-1"]), &["--steps", "-1", "from 1"]);
+    assert_refused(
+        &evolver.run(&["evaluate", "run/config.toml"]),
+        &["config.toml", "not a genome"],
+    );
+}
+
+#[test]
+fn damage_gives_the_rows_of_the_papers_tables() {
+    let evolver = with_a_run(&[]);
+    let damage = |flags: &str| {
+        let arguments: Vec<&str> = flags.split_whitespace().collect();
+        evolver.run(&[&["damage", "run", "--structure", "line"], &arguments[..]].concat())
+    };
+    let table = json(&damage("--area 2,3,8,9 --reposition --repeat 4 --json"));
+    let rows = table["rows"].as_array().unwrap();
+    let names: Vec<&str> = rows
+        .iter()
+        .map(|row| row["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["initial run", "new starts", "reposition"]);
+    assert_eq!(rows[0]["similarity"]["mean"], 1.0);
+    let written: Value = serde_json::from_slice(&evolver.read("run/final.json")).unwrap();
+    assert_eq!(rows[0]["fitness"]["mean"], written["fitness"]);
+    assert_eq!(rows[2]["robots"]["mean"], 100.0);
+    assert_eq!(rows[2]["fitness"]["values"].as_array().unwrap().len(), 4);
+
+    let table = json(&damage("--area 12,13,2,1 --remove --json"));
+    let inside = |pose: &Value| {
+        let at = |index: usize| pose[index].as_u64().unwrap();
+        (at(0) >= 12 || at(0) <= 2) && (at(1) >= 13 || at(1) <= 1)
+    };
+    let poses = written["final"].as_array().unwrap();
+    let left = poses.iter().filter(|pose| !inside(pose)).count();
+    assert_eq!(table["rows"][2]["robots"]["mean"], left as f64);
+    let shown = damage("--area 2,3,8,9 --remove");
+    assert!(shown.stdout.contains("similarity"), "{shown:?}");
+}
+
+#[test]
+fn damage_refuses_what_cannot_be() {
+    let evolver = with_a_run(&[]);
+    let damage = |flags: &str| {
+        let arguments: Vec<&str> = flags.split_whitespace().collect();
+        evolver.run(&[&["damage", "run"], &arguments[..]].concat())
+    };
+    assert_refused(
+        &damage("--area 2,3,8 --remove"),
+        &["--area", "2,3,8", "four cells"],
+    );
+    assert_refused(
+        &damage("--area 2,3,8,15 --remove"),
+        &["--area", "(8, 15)", "15x15"],
+    );
+    assert_refused(
+        &damage("--area 0,0,14,14 --remove"),
+        &["--area", "0 robots"],
+    );
+    let crowded = damage("--area 0,0,14,13 --reposition");
+    assert_refused(&crowded, &["--area", "robots to reposition"]);
+    let named = damage("--area 1,1,2,2 --remove --structure ring");
+    assert_refused(&named, &["--structure", "ring", "line, pair"]);
+    assert_eq!(damage("--area 1,1,2,2").code, Some(2));
+    assert_eq!(damage("--area 1,1,2,2 --remove --reposition").code, Some(2));
+}
+
+#[test]
+fn genome_text_becomes_genome_files_and_says_what_rounding_did() {
+    let evolver = Evolver::in_empty_folder();
+    for model in ["a", "b", "c", "c-partly-predefined"] {
+        let path = |name: &str| fixture(model).join(name).to_string_lossy().into_owned();
+        let (action, prediction) = (path("action_genomes"), path("prediction_genomes"));
+        let flags = ["import", "--action", &action, "--prediction", &prediction];
+        let imported = evolver.run(&[&flags[..], &["--out", model]].concat());
+        assert_eq!(imported.code, Some(0), "{imported:?}");
+        assert!(
+            imported.stdout.contains("largest rounding 1."),
+            "{imported:?}"
+        );
+        assert!(
+            imported.stdout.contains("0 weights that did not fit"),
+            "{imported:?}"
+        );
+        let shown = evolver.run(&["inspect", &format!("{model}/generation-2.genome")]);
+        assert!(shown.stdout.contains("an unknown seed"), "{shown:?}");
+        let again = evolver.run(&[&flags[..], &["--out", model]].concat());
+        assert_refused(&again, &["--out", model, "exists"]);
+        let one = [&flags[..], &["--generation", "1", "--out", "one"]].concat();
+        assert_eq!(evolver.run(&one).code, Some(0));
+        assert_eq!(
+            fs::read_dir(evolver.folder().join("one")).unwrap().count(),
+            1
+        );
+        fs::remove_dir_all(evolver.folder().join("one")).unwrap();
+        let beyond = [&flags[..], &["--generation", "3", "--out", "beyond"]].concat();
+        assert_refused(&evolver.run(&beyond), &["--generation", "3", "0 to 2"]);
+    }
+    let action = fixture("c/action_genomes").to_string_lossy().into_owned();
+    let predefined = [
+        "import",
+        "--action",
+        &action,
+        "--predefine",
+        "line",
+        "--out",
+        "line",
+    ];
+    let imported = evolver.run(&predefined);
+    assert!(imported.stdout.contains("166 weights"), "{imported:?}");
+    let missing = evolver.run(&["import", "--action", &action]);
+    assert_refused(&missing, &["--prediction", "--predefine"]);
+}
+
+#[test]
+fn genome_text_that_is_not_is_refused_with_its_line() {
+    let evolver = Evolver::in_empty_folder();
+    let prediction = fixture("c/prediction_genomes")
+        .to_string_lossy()
+        .into_owned();
+    let text = fixture_text("c/action_genomes");
+    let lines: Vec<&str> = text.lines().collect();
+    let short = lines[1].trim_end().rsplit_once(' ').unwrap().0;
+    let cases = [
+        (
+            text.replacen(lines[1], short, 1),
+            vec!["line 2", "223", "224"],
+        ),
+        (
+            text.replacen(lines[0], "0.5 nonsense", 1),
+            vec!["line 1", "nonsense"],
+        ),
+        (lines[..2].join("\n"), vec!["line 3", "ends"]),
+        (String::new(), vec!["line 1", "ends"]),
+    ];
+    for (text, words) in cases {
+        evolver.write("action", text.as_bytes());
+        let flags = ["import", "--action", "action", "--prediction", &prediction];
+        assert_refused(&evolver.run(&flags), &words);
+    }
+    assert_eq!(evolver.files(), ["action"], "nothing else was written");
+}
+
+#[test]
+fn an_exported_trajectory_is_classified_as_its_run_is() {
+    let evolver = with_a_run(&[]);
+    let flags = [
+        "export",
+        "run",
+        "--format",
+        "trajectory",
+        "--out",
+        "trajectory",
+    ];
+    assert_eq!(evolver.run(&flags).code, Some(0));
+    assert_eq!(evolver.text("trajectory").lines().count(), 3 + 61 * 100);
+    let of_run = json(&evolver.run(&["classify", "run", "--json"]));
+    let of_text = json(&evolver.run(&["classify", "trajectory", "--json"]));
+    assert_eq!(of_text["structures"], of_run["structures"]);
+    assert_refused(&evolver.run(&flags), &["--out", "trajectory", "exists"]);
+}
