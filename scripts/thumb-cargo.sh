@@ -7,7 +7,7 @@
 # The target's core library comes from the first of these that works:
 #
 #   1. the Rust toolchain in use has it;
-#   2. rustup adds it;
+#   2. rustup adds it (not tried with RUSTUP_TARGET_ADD=0, for those who know that it cannot);
 #   3. the system's Rust builds it from source. With PROVIDE_TOOLS=1, Debian's packages for this
 #      are installed.
 #
@@ -35,7 +35,7 @@ has_target() {
 }
 
 add_target() {
-    command -v rustup >/dev/null || return 1
+    [ "${RUSTUP_TARGET_ADD:-1}" = 1 ] && command -v rustup >/dev/null || return 1
     say "rustup target add $target"
     timeout 120 rustup target add "$target" >&2 && has_target
 }
