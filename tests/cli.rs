@@ -417,7 +417,7 @@ fn only_an_unchanged_run_is_resumed() {
 #[test]
 fn ctrl_c_ends_cleanly_and_says_how_to_go_on() {
     let evolver = Evolver::in_empty_folder();
-    let arguments = |out| short(&["--seed", "9", "--generations", "2000", "--out", out]);
+    let arguments = |out| short(&["--seed", "9", "--generations", "400", "--out", out]);
     let whole = evolver.run(&arguments("whole"));
     let running = evolver.start(&arguments("cut"));
     running.wait_for_lines(1);

@@ -1,5 +1,7 @@
 //! One seed, one result: whatever the threads, the build, the interruptions.
 
+use minimal_surprise_sim::Path;
+use minimal_surprise_sim::engine::PATH_VARIABLE;
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use std::time::Duration;
@@ -78,6 +80,28 @@ fn the_number_of_threads_changes_nothing() {
         let hash = hash(&evolver, &EVOLUTION, &["--threads", threads]);
         assert_eq!(hash, EVOLUTION_HASH, "{threads} threads");
     }
+}
+
+#[test]
+fn engines_and_their_paths_change_nothing() {
+    let evolver = Evolver::in_empty_folder();
+    assert_eq!(
+        hash(&evolver, &EVOLUTION, &["--engine", "plain"]),
+        EVOLUTION_HASH
+    );
+    for (arguments, expected) in PINNED.into_iter().chain([(&EVOLUTION[..], EVOLUTION_HASH)]) {
+        for path in Path::available() {
+            let evolver = Evolver::in_empty_folder();
+            let arguments = [arguments, &["--out", "run"]].concat();
+            let run = evolver.run_with((PATH_VARIABLE, path.name()), &arguments);
+            assert_eq!(run.code, Some(0), "{run:?}");
+            let hash = evolver.text("run/DONE");
+            assert_eq!(hash.trim(), expected, "path {}", path.name());
+        }
+    }
+    let refused = evolver.run_with((PATH_VARIABLE, "abacus"), &["evolve"]);
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.stderr.contains("abacus") && refused.stderr.contains("portable"));
 }
 
 #[test]

@@ -111,20 +111,22 @@ impl Evolver {
         command
     }
 
+    /// [`Evolver::run`] with an environment variable set.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn run_with(&self, variable: (&str, &str), arguments: &[impl AsRef<OsStr>]) -> Finished {
+        let mut command = self.command(arguments);
+        command.env(variable.0, variable.1);
+        finish(&mut command)
+    }
+
     /// Runs it to its end.
     ///
     /// # Panics
     /// If it cannot be started.
     pub fn run(&self, arguments: &[impl AsRef<OsStr>]) -> Finished {
-        let output = self
-            .command(arguments)
-            .output()
-            .expect("the program starts");
-        Finished {
-            code: output.status.code(),
-            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
-            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
-        }
+        finish(&mut self.command(arguments))
     }
 
     /// Starts it.
@@ -186,6 +188,15 @@ impl Evolver {
     #[must_use]
     pub fn text(&self, name: &str) -> String {
         String::from_utf8_lossy(&self.read(name)).into_owned()
+    }
+}
+
+fn finish(command: &mut Command) -> Finished {
+    let output = command.output().expect("the program starts");
+    Finished {
+        code: output.status.code(),
+        stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+        stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
     }
 }
 
