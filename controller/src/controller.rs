@@ -96,6 +96,12 @@ impl Controller {
         Self::build(genome.topology(), &mut genome.weights())
     }
 
+    /// The controller of a genome whose weights are all zero: it turns clockwise in every step.
+    #[must_use]
+    pub fn zeroed(topology: Topology) -> Self {
+        Self::build(topology, &mut core::iter::empty())
+    }
+
     fn build(topology: Topology, weights: &mut impl Iterator<Item = i16>) -> Self {
         Self {
             topology,
@@ -255,6 +261,16 @@ mod tests {
         assert_eq!(spread(0b101, 0b0011_0110), 0b0001_0010);
         assert_eq!(spread(0xffff, 0x3fff), 0x3fff);
         assert_eq!(spread(0xffff, 0), 0);
+    }
+
+    #[test]
+    fn a_zeroed_controller_is_that_of_a_zeroed_genome_and_only_turns() {
+        for topology in Topology::ALL {
+            let controller = Controller::zeroed(topology);
+            assert_eq!(controller, Controller::new(&Genome::zeroed(topology)));
+            let decided = controller.decide(SensorBits::NONE, Action::Straight);
+            assert_eq!(decided, (Action::Turn, Turn::Clockwise));
+        }
     }
 
     #[test]

@@ -1,4 +1,6 @@
 //! What the integration tests share.
 
+pub mod flash;
+pub mod full;
 pub mod golden;
 pub mod program;
