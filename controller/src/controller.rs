@@ -5,9 +5,10 @@ use crate::genome::Genome;
 use crate::network::{ActionNetwork, MAX_HIDDEN, PredictionNetwork};
 use crate::sensor::SensorBits;
 use crate::topology::Topology;
+use serde::{Deserialize, Serialize};
 
 /// What a robot does in a step. There is no stopping.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Action {
     /// One cell ahead, if it is free. Action value 0.
@@ -18,7 +19,7 @@ pub enum Action {
 }
 
 /// Which way a robot turns; decided in every step, carried out with [`Action::Turn`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Turn {
     /// To the left.
@@ -29,7 +30,7 @@ pub enum Turn {
 }
 
 /// What one step decides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decision {
     /// What to do.
@@ -62,7 +63,7 @@ pub struct State {
 /// Bits that a robot mispredicted, of all that it sensed.
 ///
 /// One minus their ratio, over all robots, is the fitness of Eq. 1 of the paper.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Surprise {
     /// Bits that were not as predicted.

@@ -3,4 +3,5 @@
 pub mod flash;
 pub mod full;
 pub mod golden;
+pub mod link_robot;
 pub mod program;
