@@ -4,9 +4,10 @@
 //! segment come out of one product: `z = 30·m`, segment `z >> 16`, position `t = (z & 0xffff) −
 //! 32768` in Q16, i.e. −½ ≤ t < ½. A segment is 65536 / 30 ≈ 2184.5 units (0.533) wide. Its cubic
 //! is evaluated by Horner's rule in units of 1/8, each step `(r·t >> 16) + c` truncating as
-//! `smlawb` does on a Cortex-M4 and `vpmulhw` on x86; then shifted right by 3 and given the sign
-//! of x. Every intermediate fits `i16`, so a vector lane of 16 bits is enough, and eight
-//! coefficients of 16 bits fit one 128-bit byte shuffle.
+//! `vpmulhw` does on x86; then shifted right by 3 and given the sign of x. Every intermediate fits
+//! `i16`, so a vector lane of 16 bits is enough, and eight coefficients of 16 bits fit one 128-bit
+//! byte shuffle. [`activate`] computes the same values in 32 bits, with multiply-accumulate
+//! instructions and without looking at the sign.
 //!
 //! From 17476 units (4.27) on the value is 4095: within one unit of 4096·tanh for every larger x.
 //!
@@ -37,17 +38,25 @@ pub const SEGMENTS: [[i16; 4]; 8] = [
 /// Value of the activation beyond the last segment, in units of 1/8.
 const TAIL: i32 = 4095 << 3;
 
-/// One row per value of `z >> 16`, so that no input needs a clamp or a bounds check: the eight
-/// cubics, then the constant tail.
-static ROWS: [[i32; 4]; 16] = {
-    let mut rows = [[TAIL, 0, 0, 0]; 16];
+/// One row per value of `z >> 16`, 0 … 15 and −16 … −1, so that no input needs a clamp, a bounds
+/// check or its magnitude: what [`activate`] multiplies and adds, highest power first.
+///
+/// An x < 0 has the segment −1 − s and the position −t where −x has s and t. (Where t is −½, −t
+/// does not fit; only 0 and −32768 have such a t, and they need none.) With −t, its row gives the
+/// negative of the first result, then the second as it is, then the negative of the third; its
+/// constants hold the d − 1 of ⌊(d − 1 − a) / d⌋ = −⌊a / d⌋.
+static ROWS: [[i32; 4]; 32] = {
+    let mut rows = [[0; 4]; 32];
     let mut segment = 0;
-    while segment < SEGMENTS.len() {
-        let mut power = 0;
-        while power < 4 {
-            rows[segment][power] = SEGMENTS[segment][power] as i32;
-            power += 1;
-        }
+    while segment < 16 {
+        let [c0, c1, c2, c3] = if segment < SEGMENTS.len() {
+            let [c0, c1, c2, c3] = SEGMENTS[segment];
+            [c0 as i32, c1 as i32, c2 as i32, c3 as i32]
+        } else {
+            [TAIL, 0, 0, 0]
+        };
+        rows[segment] = [c3, c2 << 16, c1, c0 << 16];
+        rows[31 - segment] = [c3, 0xffff - (c2 << 16), c1, 0x7_ffff - (c0 << 16)];
         segment += 1;
     }
     rows
@@ -61,16 +70,12 @@ static ROWS: [[i32; 4]; 16] = {
 #[inline]
 #[must_use]
 pub fn activate(x_q3_12: i16) -> i16 {
-    let x = i32::from(x_q3_12);
-    let magnitude = x.unsigned_abs();
-    let scaled = magnitude * u32::from(SEGMENT_SCALE);
-    let [c0, c1, c2, c3] = ROWS[(scaled >> 16) as usize & 15];
+    let scaled = i32::from(x_q3_12) * i32::from(SEGMENT_SCALE);
+    let [c3, c2, c1, c0] = ROWS[(scaled >> 16) as usize & 31];
     let t = i32::from((scaled as u16 ^ 0x8000) as i16);
-    let r = mul_high(c3, t) + c2;
+    let r = (c3 * t + c2) >> 16;
     let r = mul_high(r, t) + c1;
-    let r = (mul_high(r, t) + c0) >> 3;
-    let sign = x >> 31;
-    ((r ^ sign) - sign) as i16
+    ((r * t + c0) >> 19) as i16
 }
 
 /// `(a · b) >> 16` for `b` in the range of `i16`.

@@ -33,6 +33,11 @@ pub const CRC_BYTES: usize = 4;
 /// Most bytes of a container; a buffer of this size holds any genome.
 pub const CONTAINER_BYTES_MAX: usize =
     PREFIX_BYTES + HEADER_BYTES_MAX + 2 * MAX_WEIGHTS + CRC_BYTES;
+/// Fewer bytes than this are no container, whatever they say.
+const CONTAINER_BYTES_MIN: usize = PREFIX_BYTES + CRC_BYTES;
+
+const _: () = assert!(HEADER_BYTES_MAX <= u8::MAX as usize);
+const _: () = assert!(CONTAINER_BYTES_MAX <= u16::MAX as usize);
 
 /// CRC-32C (Castagnoli): the checksum of the container.
 pub static CRC_32C: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
@@ -75,6 +80,14 @@ pub enum DecodeError {
         /// Bytes needed, as far as is known.
         needed: usize,
     },
+    /// The container cannot be as long as it says.
+    #[error(
+        "a length of {found} bytes; containers have {CONTAINER_BYTES_MIN} to {CONTAINER_BYTES_MAX}"
+    )]
+    ImpossibleLength {
+        /// The length field.
+        found: usize,
+    },
     /// There is more than the container.
     #[error("{found} bytes, but the container ends after {length}")]
     TrailingBytes {
@@ -103,9 +116,23 @@ pub enum DecodeError {
         /// The checksum of the bytes.
         computed: u32,
     },
+    /// The header cannot be as long as it says.
+    #[error("a header of {found} bytes; there is room for at most {room}")]
+    HeaderTooLong {
+        /// The header length byte.
+        found: usize,
+        /// Most bytes that a header of this container can have.
+        room: usize,
+    },
     /// The header does not decode, or is not written the one way it is allowed to be.
-    #[error("the header is malformed")]
-    MalformedHeader,
+    #[error(
+        "malformed header: its {length} bytes are not exactly the fields of format version \
+         {FORMAT_VERSION}, each in its shortest form"
+    )]
+    MalformedHeader {
+        /// Bytes of the header.
+        length: usize,
+    },
     /// Evolved under another arithmetic.
     #[error("evolved for kernel {found}; this controller is kernel {KERNEL_ID}")]
     OtherKernel {
@@ -134,8 +161,8 @@ pub enum DecodeError {
     NoSuchTopology(#[from] TopologyError),
     /// The numbers of weights are not the topology's, or not those that the length leaves room for.
     #[error(
-        "{action} action and {prediction} prediction weights in {bytes} bytes; \
-         the topology has {expected_action} and {expected_prediction}"
+        "{action} action and {prediction} prediction weights in {bytes} bytes; the topology has \
+         {expected_action} and {expected_prediction} in {}", 2 * (expected_action + expected_prediction)
     )]
     SizesDoNotFit {
         /// Action weights announced.
@@ -172,7 +199,8 @@ pub struct BufferTooSmall {
 pub struct EncodedGenome<'a> {
     topology: Topology,
     provenance: Provenance,
-    weights: &'a [u8],
+    /// Little-endian, one a weight.
+    weights: &'a [[u8; 2]],
 }
 
 impl<'a> EncodedGenome<'a> {
@@ -180,16 +208,22 @@ impl<'a> EncodedGenome<'a> {
     ///
     /// # Errors
     /// [`DecodeError`]: the first thing found wrong, in the order magic, version, length, checksum,
-    /// header, kernel, topology, sizes, weights.
+    /// header, kernel, topology, sizes, weights. A number of bytes below [`PREFIX_BYTES`] comes
+    /// before all others.
     pub fn decode(bytes: &'a [u8]) -> Result<Self, DecodeError> {
-        let body = checked_body(bytes)?;
-        let header_length = usize::from(body[5]);
-        let block = &body[PREFIX_BYTES..];
-        if header_length > HEADER_BYTES_MAX || header_length > block.len() {
-            return Err(DecodeError::MalformedHeader);
+        let prefix = Prefix::read(bytes)?;
+        let block = checked_block(bytes, prefix.container_bytes)?;
+        let too_long = DecodeError::HeaderTooLong {
+            found: prefix.header_bytes,
+            room: block.len().min(HEADER_BYTES_MAX),
+        };
+        if prefix.header_bytes > HEADER_BYTES_MAX {
+            return Err(too_long);
         }
-        let (header_bytes, weights) = block.split_at(header_length);
-        let header = decode_header(header_bytes)?;
+        let (header, weights) = block
+            .split_at_checked(prefix.header_bytes)
+            .ok_or(too_long)?;
+        let header = decode_header(header)?;
         if header.kernel != KERNEL_ID {
             return Err(DecodeError::OtherKernel {
                 found: header.kernel,
@@ -211,7 +245,7 @@ impl<'a> EncodedGenome<'a> {
         let genome = Self {
             topology,
             provenance: header.provenance,
-            weights,
+            weights: weights.as_chunks().0,
         };
         match genome.weights().position(|weight| weight == i16::MIN) {
             Some(index) => Err(DecodeError::InvalidWeight { index }),
@@ -233,9 +267,7 @@ impl<'a> EncodedGenome<'a> {
 
     /// The weights, Q3.12, in genome order.
     pub fn weights(&self) -> impl ExactSizeIterator<Item = i16> + use<'a> {
-        self.weights
-            .chunks_exact(2)
-            .map(|pair| i16::from_le_bytes([pair[0], pair[1]]))
+        self.weights.iter().map(|pair| i16::from_le_bytes(*pair))
     }
 
     /// A copy of the weights in fixed memory.
@@ -268,85 +300,133 @@ pub fn encode<'b>(
         prediction_weights: topology.prediction_weights() as u16,
     };
     let mut header_buffer = [0; HEADER_BYTES_MAX];
-    let header_bytes = postcard::to_slice(&header, &mut header_buffer).map_err(|_| too_small)?;
-    let length = PREFIX_BYTES + header_bytes.len() + 2 * topology.weights() + CRC_BYTES;
+    let header = postcard::to_slice(&header, &mut header_buffer).map_err(|_| too_small)?;
+    let length = PREFIX_BYTES + header.len() + 2 * topology.weights() + CRC_BYTES;
     let container = buffer.get_mut(..length).ok_or(too_small)?;
-    let (body, crc) = container.split_at_mut(length - CRC_BYTES);
-    let (prefix, rest) = body.split_at_mut(PREFIX_BYTES);
-    let (header_place, weights_place) = rest.split_at_mut(header_bytes.len());
-    prefix[..4].copy_from_slice(&MAGIC);
-    prefix[4] = FORMAT_VERSION;
-    prefix[5] = header_bytes.len() as u8;
-    prefix[6..].copy_from_slice(&(length as u16).to_le_bytes());
-    header_place.copy_from_slice(header_bytes);
-    for (place, weight) in weights_place.chunks_exact_mut(2).zip(genome.weights()) {
-        place.copy_from_slice(&weight.to_le_bytes());
+    let (body, crc) = container.split_last_chunk_mut().ok_or(too_small)?;
+    let prefix = Prefix {
+        header_bytes: header.len(),
+        container_bytes: length,
+    };
+    let weights = genome.weights().iter().flat_map(|w| w.to_le_bytes());
+    let bytes = prefix.to_bytes().into_iter();
+    let bytes = bytes.chain(header.iter().copied()).chain(weights);
+    for (place, byte) in body.iter_mut().zip(bytes) {
+        *place = byte;
     }
-    crc.copy_from_slice(&CRC_32C.checksum(body).to_le_bytes());
+    *crc = CRC_32C.checksum(body).to_le_bytes();
     Ok(container)
 }
 
-/// Length of the container that starts with these bytes, from its first [`PREFIX_BYTES`].
+/// Length of the container that starts with these bytes, from its first [`PREFIX_BYTES`]; at most
+/// [`CONTAINER_BYTES_MAX`].
 ///
 /// # Errors
-/// [`DecodeError::TooShort`], [`DecodeError::WrongMagic`] or [`DecodeError::UnknownVersion`].
+/// [`DecodeError::TooShort`], [`DecodeError::WrongMagic`], [`DecodeError::UnknownVersion`] or
+/// [`DecodeError::ImpossibleLength`].
 pub fn container_length(bytes: &[u8]) -> Result<usize, DecodeError> {
-    let Some(prefix) = bytes.first_chunk::<PREFIX_BYTES>() else {
-        return Err(DecodeError::TooShort {
-            found: bytes.len(),
-            needed: PREFIX_BYTES + CRC_BYTES,
-        });
-    };
-    let [m0, m1, m2, m3, version, _, length_low, length_high] = *prefix;
-    let magic = [m0, m1, m2, m3];
-    if magic != MAGIC {
-        return Err(DecodeError::WrongMagic { found: magic });
-    }
-    if version != FORMAT_VERSION {
-        return Err(DecodeError::UnknownVersion { found: version });
-    }
-    Ok(usize::from(u16::from_le_bytes([length_low, length_high])))
+    Ok(Prefix::read(bytes)?.container_bytes)
 }
 
-/// Magic, version, length and checksum; returns everything before the checksum, at least the
-/// prefix.
-fn checked_body(bytes: &[u8]) -> Result<&[u8], DecodeError> {
-    let length = container_length(bytes)?;
-    let found = bytes.len();
-    let shortest = PREFIX_BYTES + CRC_BYTES;
-    if found < length || found < shortest {
-        return Err(DecodeError::TooShort {
-            found,
-            needed: length.max(shortest),
-        });
+/// The first bytes: magic, version and the two lengths.
+struct Prefix {
+    header_bytes: usize,
+    container_bytes: usize,
+}
+
+impl Prefix {
+    fn read(bytes: &[u8]) -> Result<Self, DecodeError> {
+        let Some(prefix) = bytes.first_chunk::<PREFIX_BYTES>() else {
+            return Err(DecodeError::TooShort {
+                found: bytes.len(),
+                needed: CONTAINER_BYTES_MIN,
+            });
+        };
+        let [m0, m1, m2, m3, version, header_bytes, low, high] = *prefix;
+        let magic = [m0, m1, m2, m3];
+        if magic != MAGIC {
+            return Err(DecodeError::WrongMagic { found: magic });
+        }
+        if version != FORMAT_VERSION {
+            return Err(DecodeError::UnknownVersion { found: version });
+        }
+        let container_bytes = usize::from(u16::from_le_bytes([low, high]));
+        if !(CONTAINER_BYTES_MIN..=CONTAINER_BYTES_MAX).contains(&container_bytes) {
+            return Err(DecodeError::ImpossibleLength {
+                found: container_bytes,
+            });
+        }
+        Ok(Self {
+            header_bytes: usize::from(header_bytes),
+            container_bytes,
+        })
     }
+
+    fn to_bytes(&self) -> [u8; PREFIX_BYTES] {
+        let [m0, m1, m2, m3] = MAGIC;
+        let [low, high] = (self.container_bytes as u16).to_le_bytes();
+        let header_bytes = self.header_bytes as u8;
+        [m0, m1, m2, m3, FORMAT_VERSION, header_bytes, low, high]
+    }
+}
+
+/// Length and checksum; returns what is between the prefix and the checksum.
+fn checked_block(bytes: &[u8], length: usize) -> Result<&[u8], DecodeError> {
+    let found = bytes.len();
     if found > length {
         return Err(DecodeError::TrailingBytes { found, length });
     }
-    let Some((body, crc)) = bytes.split_last_chunk::<CRC_BYTES>() else {
-        return Err(DecodeError::TooShort {
-            found,
-            needed: shortest,
-        });
+    let too_short = DecodeError::TooShort {
+        found,
+        needed: length,
     };
+    if found < length {
+        return Err(too_short);
+    }
+    let (body, crc) = bytes.split_last_chunk::<CRC_BYTES>().ok_or(too_short)?;
     let found = u32::from_le_bytes(*crc);
     let computed = CRC_32C.checksum(body);
-    if found == computed {
-        Ok(body)
-    } else {
-        Err(DecodeError::BadCrc { found, computed })
+    if found != computed {
+        return Err(DecodeError::BadCrc { found, computed });
+    }
+    body.get(PREFIX_BYTES..).ok_or(too_short)
+}
+
+/// postcard accepts more than one spelling of a number, and bytes after the last field. Both only
+/// make the header longer, so that it is the one way to write its fields if it is the shortest.
+fn decode_header(bytes: &[u8]) -> Result<Header, DecodeError> {
+    match postcard::from_bytes::<Header>(bytes) {
+        Ok(header) if header.shortest_bytes() == bytes.len() => Ok(header),
+        _ => Err(DecodeError::MalformedHeader {
+            length: bytes.len(),
+        }),
     }
 }
 
-/// postcard accepts more than one spelling of a number; only the one it writes itself is allowed.
-fn decode_header(bytes: &[u8]) -> Result<Header, DecodeError> {
-    let (header, rest): (Header, _) =
-        postcard::take_from_bytes(bytes).map_err(|_| DecodeError::MalformedHeader)?;
-    let mut buffer = [0; HEADER_BYTES_MAX];
-    match postcard::to_slice(&header, &mut buffer) {
-        Ok(again) if rest.is_empty() && *again == *bytes => Ok(header),
-        _ => Err(DecodeError::MalformedHeader),
+impl Header {
+    /// Length of the header in its shortest form, which is the one that postcard writes.
+    fn shortest_bytes(&self) -> usize {
+        let Provenance {
+            seed,
+            generation,
+            matched_bits,
+            scored_bits,
+        } = self.provenance;
+        let kernel_codes_and_seed_tag = size_of::<KernelId>() + 3 + 1;
+        kernel_codes_and_seed_tag
+            + seed.map_or(0, varint_bytes)
+            + varint_bytes(generation.into())
+            + varint_bytes(matched_bits)
+            + varint_bytes(scored_bits)
+            + varint_bytes(self.action_weights.into())
+            + varint_bytes(self.prediction_weights.into())
     }
+}
+
+/// Length of a number written seven bits a byte.
+fn varint_bytes(value: u64) -> usize {
+    let bits = u64::BITS - (value | 1).leading_zeros();
+    bits.div_ceil(7) as usize
 }
 
 fn codes_of_topology(topology: Topology) -> (u8, u8, u8) {
@@ -425,6 +505,39 @@ mod tests {
         let mut buffer = [0; HEADER_BYTES_MAX];
         let bytes = postcard::to_slice(&header, &mut buffer).unwrap();
         assert_eq!(bytes.len(), HEADER_BYTES_MAX);
+    }
+
+    #[test]
+    fn the_shortest_length_of_a_header_is_that_of_the_header_written() {
+        let ends = [0, 7, 14, 16, 21, 28, 32, 35, 42, 49, 56, 63].map(|bits| 1_u64 << bits);
+        for value in ends.into_iter().flat_map(|end| [end - 1, end]) {
+            let header = Header {
+                kernel: KERNEL_ID,
+                model: 0,
+                prediction: 0,
+                template: 0,
+                provenance: Provenance {
+                    seed: Some(value),
+                    generation: value as u32,
+                    matched_bits: value,
+                    scored_bits: u64::MAX - value,
+                },
+                action_weights: value as u16,
+                prediction_weights: u16::MAX - value as u16,
+            };
+            let no_seed = Header {
+                provenance: Provenance {
+                    seed: None,
+                    ..header.provenance
+                },
+                ..header
+            };
+            for header in [header, no_seed] {
+                let mut buffer = [0; HEADER_BYTES_MAX];
+                let bytes = postcard::to_slice(&header, &mut buffer).unwrap();
+                assert_eq!(bytes.len(), header.shortest_bytes(), "{header:?}");
+            }
+        }
     }
 
     #[test]

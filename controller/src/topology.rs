@@ -94,7 +94,7 @@ pub struct Topology {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TopologyError {
     /// Squares and triangular lattices need model C.
-    #[error("the template {} does not exist for sensor model {model:?}", template.name())]
+    #[error("the template {} does not exist for sensor model {model:?}, only for C", template.name())]
     NoSuchTemplate {
         /// The template asked for.
         template: Template,

@@ -1,22 +1,20 @@
-//! The command line: parse, check, run, report.
+//! The command line: parse and hand over to a command.
 
-use crate::experiment::Experiment;
-use crate::files;
-use crate::report::progress::{Progress, ProgressMode};
-use crate::report::summary;
-use crate::run_dir::{Found, RunDir, RunDirError};
-use crate::settings::{self, Given, SettingError, Settings};
-use clap::{Args, CommandFactory, Parser, Subcommand};
-use minimal_surprise_controller::EncodedGenome;
-use std::path::{Path, PathBuf};
+use crate::commands::BadInput;
+use crate::commands::classify::classify;
+use crate::commands::damage::{DamageArgs, damage};
+use crate::commands::evaluate::{EvaluateArgs, evaluate};
+use crate::commands::evolve::{EvolveArgs, evolve};
+use crate::commands::export::{ExportArgs, export};
+use crate::commands::import::{ImportArgs, import};
+use crate::commands::inspect::inspect;
+use crate::run_dir::RunDirError;
+use clap::{CommandFactory, Parser, Subcommand};
+use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Exit code for input that cannot be used; nothing has been written.
 const EXIT_BAD_INPUT: u8 = 2;
-/// Exit code after Ctrl-C.
-const EXIT_INTERRUPTED: u8 = 130;
 
 /// Evolves swarms of robots that minimise surprise, on the arithmetic that the robots run.
 ///
@@ -32,6 +30,22 @@ struct Cli {
 enum Command {
     /// Evolve a swarm, and leave its genome and everything about the run in a directory.
     Evolve(Box<EvolveArgs>),
+    /// Name what a swarm formed, show which robots belong to it, and measure the run.
+    Classify {
+        /// A run directory, a final.json, an agent_trajectory, or a drawing of ▶ ▲ ◀ ▼ and ·.
+        state: PathBuf,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Evaluate a genome from new starts, on other grids, with other noise and swarm sizes.
+    Evaluate(EvaluateArgs),
+    /// Take a part of what a swarm formed away, or scatter it, and see what the swarm does.
+    Damage(DamageArgs),
+    /// Write a run in the format of another program.
+    Export(ExportArgs),
+    /// Make genome files of the genome text of the program that the paper's authors published.
+    Import(ImportArgs),
     /// Show everything in a genome file.
     Inspect {
         /// The genome file.
@@ -44,85 +58,19 @@ enum Command {
     },
 }
 
-/// Settings as flags; a file has the same names. Defaults are the paper's.
-#[derive(Debug, Default, Args)]
-struct EvolveArgs {
-    /// TOML file with any of the settings below; flags go before it.
-    config: Option<PathBuf>,
-    /// Width and height of the torus, in cells [default: 15x15].
-    #[arg(long, value_name = "WxH", allow_hyphen_values = true)]
-    grid: Option<String>,
-    /// Swarm size [default: 100].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    robots: Option<String>,
-    /// Sensor model: a, b or c [default: c].
-    #[arg(long, value_name = "MODEL", allow_hyphen_values = true)]
-    sensor_model: Option<String>,
-    /// Probability that a sensor bit is flipped [default: 0].
-    #[arg(long, value_name = "P", allow_hyphen_values = true)]
-    noise: Option<String>,
-    /// Fix all predictions to a template: line, pair, square or triangular-lattice.
-    #[arg(long, value_name = "TEMPLATE", allow_hyphen_values = true)]
-    predefine: Option<String>,
-    /// Fix only the predictions that the template sets: line (sensor model c).
-    #[arg(long, value_name = "TEMPLATE", allow_hyphen_values = true)]
-    predefine_partly: Option<String>,
-    /// Genomes of a generation [default: 50].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    population: Option<String>,
-    /// Generations [default: 100].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    generations: Option<String>,
-    /// Repetitions of an evaluation; the worst counts [default: 10].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    repetitions: Option<String>,
-    /// Steps of a repetition [default: 500].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    steps: Option<String>,
-    /// Probability that a weight mutates [default: 0.1; 0.3 for the partly predefined line on
-    /// 20x20].
-    #[arg(long, value_name = "P", allow_hyphen_values = true)]
-    mutation: Option<String>,
-    /// Start from a genome and its mutants.
-    #[arg(long, value_name = "GENOME")]
-    from: Option<String>,
-    /// Root of all random numbers; drawn and printed if not given.
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    seed: Option<String>,
-    /// Threads [default: one a core]; the result does not depend on them.
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    threads: Option<String>,
-    /// Directory of the run; must not exist [default: a new one in runs/].
-    #[arg(long, value_name = "DIR")]
-    out: Option<String>,
-    /// Go on with a run that was interrupted, under the settings in its directory.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["config", "grid", "robots",
-        "sensor_model", "noise", "predefine", "predefine_partly", "population", "generations",
-        "repetitions", "steps", "mutation", "from", "seed", "out"])]
-    resume: Option<PathBuf>,
-    /// How progress is shown.
-    #[arg(long, value_enum, default_value_t)]
-    progress: ProgressMode,
-}
-
-/// Input that cannot be used, in one message.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct BadInput(String);
-
-impl From<SettingError> for BadInput {
-    fn from(error: SettingError) -> Self {
-        Self(error.to_string())
-    }
-}
-
 /// Runs the program with the process's arguments.
 #[must_use]
 pub fn main() -> ExitCode {
+    let done = |()| ExitCode::SUCCESS;
     let result = match Cli::parse().command {
         None => evolve(&EvolveArgs::default()),
         Some(Command::Evolve(arguments)) => evolve(&arguments),
-        Some(Command::Inspect { genome }) => inspect(&genome),
+        Some(Command::Classify { state, json }) => classify(&state, json).map(done),
+        Some(Command::Evaluate(arguments)) => evaluate(&arguments).map(done),
+        Some(Command::Damage(arguments)) => damage(&arguments).map(done),
+        Some(Command::Export(arguments)) => export(&arguments).map(done),
+        Some(Command::Import(arguments)) => import(&arguments).map(done),
+        Some(Command::Inspect { genome }) => inspect(&genome).map(done),
         Some(Command::Completions { shell }) => {
             let mut stdout = std::io::stdout();
             clap_complete::generate(shell, &mut Cli::command(), "evolver", &mut stdout);
@@ -137,132 +85,4 @@ pub fn main() -> ExitCode {
                 .is_some_and(RunDirError::is_bad_input);
         ExitCode::from(if bad_input { EXIT_BAD_INPUT } else { 1 })
     })
-}
-
-impl EvolveArgs {
-    /// All settings given, flags before the file.
-    fn given(&self) -> Result<Given, SettingError> {
-        let mut given = Given::default();
-        let flags = [
-            ("grid", &self.grid),
-            ("robots", &self.robots),
-            ("sensor-model", &self.sensor_model),
-            ("noise", &self.noise),
-            ("predefine", &self.predefine),
-            ("predefine-partly", &self.predefine_partly),
-            ("population", &self.population),
-            ("generations", &self.generations),
-            ("repetitions", &self.repetitions),
-            ("steps", &self.steps),
-            ("mutation", &self.mutation),
-            ("from", &self.from),
-            ("seed", &self.seed),
-            ("threads", &self.threads),
-            ("out", &self.out),
-        ];
-        for (key, value) in flags {
-            given.flag(key, value.as_deref());
-        }
-        if let Some(path) = &self.config {
-            given.file(path)?;
-        }
-        Ok(given)
-    }
-}
-
-fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
-    let given = arguments.given().map_err(BadInput::from)?;
-    let threads = settings::threads(&given).map_err(BadInput::from)?;
-    let (experiment, run) = match &arguments.resume {
-        Some(directory) => match RunDir::open(directory)? {
-            Found::Unfinished(experiment, run) => (*experiment, run),
-            Found::Finished(hash) => {
-                println!("{} is complete; its hash is {hash}", directory.display());
-                return Ok(ExitCode::SUCCESS);
-            }
-        },
-        None => {
-            let settings = Settings::resolve(&given, rand::random).map_err(BadInput::from)?;
-            if given.place("seed").is_none() && arguments.progress != ProgressMode::Json {
-                println!("seed {} (drawn)", settings.seed);
-            }
-            let experiment = Experiment::new(settings);
-            let run = match settings::out(&given) {
-                Some(path) => RunDir::create(&path, &experiment),
-                None => RunDir::create_named(Path::new("runs"), &experiment),
-            }
-            .map_err(|error| BadInput(format!("--out: {error}")))?;
-            (experiment, run)
-        }
-    };
-    let mut pool = rayon::ThreadPoolBuilder::new();
-    if let Some(threads) = threads {
-        pool = pool.num_threads(threads as usize);
-    }
-    let stop = stop_on_ctrl_c()?;
-    pool.build()?
-        .install(|| generations(experiment, &run, arguments.progress, &stop))
-}
-
-/// Evaluates the generations that are left, saving each, and reports.
-fn generations(
-    mut experiment: Experiment,
-    run: &RunDir,
-    mode: ProgressMode,
-    stop: &AtomicBool,
-) -> anyhow::Result<ExitCode> {
-    let done = experiment.history().len() as u32;
-    let progress = Progress::start(mode, experiment.settings(), done);
-    while !experiment.is_finished() {
-        if stop.load(Ordering::Relaxed) {
-            progress.end();
-            let program = summary::program();
-            let directory = run.path().display();
-            eprintln!("interrupted; go on with: {program} evolve --resume {directory}");
-            return Ok(ExitCode::from(EXIT_INTERRUPTED));
-        }
-        let record = experiment.advance();
-        run.save(&experiment)?;
-        progress.generation(&record);
-    }
-    progress.end();
-    let finding = experiment
-        .finding()?
-        .ok_or_else(|| anyhow::anyhow!("an evolution has at least one generation"))?;
-    run.finish(&experiment, &finding)?;
-    if mode == ProgressMode::Json {
-        let done = serde_json::json!({
-            "event": "done",
-            "fitness": finding.outcome.fitness(),
-            "seed": experiment.settings().seed,
-            "hash": finding.hash.to_string(),
-            "run": run.path(),
-        });
-        println!("{done}");
-    } else {
-        print!("\n{}", summary::evolved(&experiment, &finding, run.path()));
-    }
-    Ok(ExitCode::SUCCESS)
-}
-
-/// The first Ctrl-C asks for an end after this generation, the second ends at once; both leave a
-/// run that can be resumed.
-fn stop_on_ctrl_c() -> Result<Arc<AtomicBool>, ctrlc::Error> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if asked.swap(true, Ordering::Relaxed) {
-            std::process::exit(EXIT_INTERRUPTED.into());
-        }
-        eprintln!("\nending after this generation; Ctrl-C again ends at once");
-    })?;
-    Ok(stop)
-}
-
-fn inspect(path: &Path) -> anyhow::Result<ExitCode> {
-    let bytes = files::read(path).map_err(|error| BadInput(error.to_string()))?;
-    let encoded = EncodedGenome::decode(&bytes)
-        .map_err(|error| BadInput(format!("{}: {error}", path.display())))?;
-    print!("{}", summary::genome(&encoded, bytes.len()));
-    Ok(ExitCode::SUCCESS)
 }

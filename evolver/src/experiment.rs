@@ -4,8 +4,10 @@ use crate::evolution::{Population, best_slot};
 use crate::run_hash::RunHash;
 use crate::settings::Settings;
 use minimal_surprise_controller::{Controller, Genome, Provenance};
-use minimal_surprise_sim::evaluation::{Evaluation, Outcome, evaluate, run};
-use minimal_surprise_sim::{Pose, SeedTree, Trial, WorldError};
+use minimal_surprise_sim::evaluation::{Evaluation, Outcome, run};
+use minimal_surprise_sim::metrics::Measures;
+use minimal_surprise_sim::structures::{Structures, classify};
+use minimal_surprise_sim::{Engine, Evaluator, Path, Pose, SeedTree, Trial, TrialSet, WorldError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -51,8 +53,23 @@ pub struct Finding {
     pub starts: Vec<Pose>,
     /// What the run came to.
     pub outcome: Outcome,
+    /// How it went.
+    pub measures: Measures,
+    /// What the swarm formed.
+    pub structures: Structures,
     /// The run's hash.
     pub hash: RunHash,
+}
+
+impl Finding {
+    /// Share of robots in the structure that the run is named after, 0 to 1.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        let names = self.structures.names();
+        names
+            .first()
+            .map_or(0.0, |&name| self.structures.share(name))
+    }
 }
 
 impl Experiment {
@@ -93,20 +110,24 @@ impl Experiment {
     }
 
     /// Evaluates a generation, in parallel, and moves on to the next. Results do not depend on the
-    /// number of threads.
-    pub fn advance(&mut self) -> GenerationRecord {
+    /// number of threads, the engine or its path.
+    pub fn advance(&mut self, engine: Engine, path: Path) -> GenerationRecord {
         let seeds = SeedTree::new(self.settings.seed);
         let generation = self.history.len() as u32;
         let scenario = &self.settings.scenario;
         let trials: Vec<Trial> = (0..self.settings.repetitions)
             .map(|repetition| scenario.trial(seeds, generation, repetition))
             .collect();
+        let trials = TrialSet::new(*scenario, self.settings.topology.model(), trials);
         let evaluations: Vec<Evaluation> = self
             .population
             .ask()
             .par_iter()
             .with_max_len(1)
-            .map(|genome| evaluate(genome, scenario, &trials))
+            .map_init(
+                || Evaluator::new(engine, path),
+                |evaluator, genome| evaluator.evaluate(genome, &trials),
+            )
             .collect();
         let matches: Vec<u64> = evaluations.iter().map(|e| e.matches).collect();
         let best = best_slot(&matches);
@@ -146,7 +167,11 @@ impl Experiment {
         let seeds = SeedTree::new(self.settings.seed);
         let scenario = &self.settings.scenario;
         let trial = scenario.trial(seeds, record.generation, record.worst_repetition);
-        let outcome = run(&Controller::new(genome), scenario, &trial, |_| {})?;
+        let mut measures =
+            Measures::starting_from(scenario.grid(), self.settings.topology, &trial.starts);
+        let outcome = run(&Controller::new(genome), scenario, &trial, |world| {
+            measures.observe(world);
+        })?;
         Ok(Some(Finding {
             genome: genome.clone(),
             provenance: Provenance {
@@ -158,6 +183,8 @@ impl Experiment {
             repetition: record.worst_repetition,
             starts: trial.starts,
             hash: self.hash.end(genome, &outcome.final_poses),
+            structures: classify(scenario.grid(), &outcome.final_poses)?,
+            measures,
             outcome,
         }))
     }

@@ -2,14 +2,17 @@
 //! directories, and the command line `evolver`.
 //!
 //! Data flows one way: [`settings`] → [`evolution`] → [`experiment`] → [`checkpoint`] and
-//! [`run_dir`] → [`report`] → [`cli`].
+//! [`run_dir`] → [`finished_run`] → [`reevaluation`] → [`report`] → [`commands`] → [`cli`].
 #![forbid(unsafe_code)]
 
 pub mod checkpoint;
 pub mod cli;
+pub mod commands;
 pub mod evolution;
 pub mod experiment;
 pub mod files;
+pub mod finished_run;
+pub mod reevaluation;
 pub mod report;
 pub mod run_dir;
 pub mod run_hash;

@@ -121,6 +121,13 @@ impl Given {
         }
     }
 
+    /// Adds a value that a flag would have had, unless one was given.
+    pub fn flag_if_missing(&mut self, key: &'static str, value: &str) {
+        if self.place(key).is_none() {
+            self.flag(key, Some(value));
+        }
+    }
+
     /// Adds the values of a TOML file, except those already given.
     ///
     /// # Errors
@@ -258,9 +265,8 @@ impl Settings {
         let grid = given.value("grid", default_grid, parse_grid)?;
         let robots = given.value("robots", 100, |text| count(text, grid.cells()))?;
         let steps = given.value("steps", 500, |text| count(text, u32::MAX))?;
-        let model = given.value("sensor-model", SensorModel::C, parse_model)?;
         let noise = given.value("noise", 0.0, probability)?;
-        let topology = resolve_topology(given, model)?;
+        let topology = resolve_topology(given)?;
         let partly_20x20 = matches!(topology.prediction(), Prediction::PartlyPredefined(_))
             && (grid.width(), grid.height()) == (20, 20);
         let default_mutation = if partly_20x20 { 0.3 } else { 0.1 };
@@ -280,10 +286,7 @@ impl Settings {
         })?;
         let from_path = given.value("from", None, |text| Ok(Some(text.to_owned())))?;
         let seed = match given.place("seed") {
-            Some(_) => given.value("seed", 0, |text| {
-                text.parse()
-                    .map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
-            })?,
+            Some(_) => given.value("seed", 0, seed)?,
             None => draw_seed(),
         };
         let template_name = |partly: bool| match topology.prediction() {
@@ -303,7 +306,7 @@ impl Settings {
             written: Written {
                 grid: grid.to_string(),
                 robots,
-                sensor_model: model_name(model).to_owned(),
+                sensor_model: model_name(topology.model()).to_owned(),
                 noise,
                 predefine: template_name(false),
                 predefine_partly: template_name(true),
@@ -370,14 +373,22 @@ pub fn out(given: &Given) -> Option<PathBuf> {
 
 const PROBABILITY: &str = "expected a probability from 0 to 1";
 
-fn probability(text: &str) -> Result<f64, String> {
+/// A probability.
+///
+/// # Errors
+/// What would be valid.
+pub fn probability(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
         _ => Err(PROBABILITY.to_owned()),
     }
 }
 
-fn count(text: &str, most: u32) -> Result<u32, String> {
+/// A whole number from 1 to `most`.
+///
+/// # Errors
+/// What would be valid.
+pub fn count(text: &str, most: u32) -> Result<u32, String> {
     match text.parse() {
         Ok(value) if (1..=most).contains(&value) => Ok(value),
         _ => Err(format!("expected a whole number from 1 to {most}")),
@@ -395,6 +406,15 @@ pub fn parse_grid(text: &str) -> Result<Grid, String> {
     let (width, height) =
         sides.ok_or_else(|| "expected width and height in cells, as in 15x15".to_owned())?;
     Grid::new(width, height).map_err(|error| error.to_string())
+}
+
+/// A seed.
+///
+/// # Errors
+/// What would be valid.
+pub fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
 }
 
 fn parse_model(text: &str) -> Result<SensorModel, String> {
@@ -424,7 +444,12 @@ fn parse_template(text: &str) -> Result<Template, String> {
         })
 }
 
-fn resolve_topology(given: &Given, model: SensorModel) -> Result<Topology, SettingError> {
+/// The topology that the settings ask for.
+///
+/// # Errors
+/// [`SettingError`] if it does not exist.
+pub fn resolve_topology(given: &Given) -> Result<Topology, SettingError> {
+    let model = given.value("sensor-model", SensorModel::C, parse_model)?;
     let prediction = match (given.place("predefine"), given.place("predefine-partly")) {
         (Some(first), Some(second)) => {
             return Err(SettingError::Conflict {
@@ -538,7 +563,7 @@ mod tests {
         );
         assert_eq!(
             error(&[("predefine", "square"), ("sensor-model", "a")]),
-            "--predefine = square: the template square does not exist for sensor model A"
+            "--predefine = square: the template square does not exist for sensor model A, only for C"
         );
         assert_eq!(
             error(&[("predefine", "line"), ("predefine-partly", "line")]),

@@ -13,16 +13,38 @@ pub fn arrow(heading: Heading) -> char {
     }
 }
 
+/// The hollow arrow of a heading, for robots that others are to stand out from.
+#[must_use]
+pub fn hollow_arrow(heading: Heading) -> char {
+    match heading {
+        Heading::East => '▷',
+        Heading::North => '△',
+        Heading::West => '◁',
+        Heading::South => '▽',
+    }
+}
+
 /// An empty cell.
 pub const EMPTY: char = '·';
 
 /// Draws a swarm, one line a row, the northernmost first.
 #[must_use]
 pub fn draw(grid: Grid, poses: &[Pose]) -> String {
+    draw_members(grid, poses, |_| true)
+}
+
+/// [`draw`] with filled arrows for the robots that are members of something and hollow arrows for
+/// the others.
+#[must_use]
+pub fn draw_members(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> String {
     let width = usize::from(grid.width());
     let mut cells = vec![EMPTY; grid.cells() as usize];
-    for pose in poses {
-        cells[grid.cell(pose.x, pose.y) as usize] = arrow(pose.heading);
+    for (robot, pose) in (0..).zip(poses) {
+        cells[grid.cell(pose.x, pose.y) as usize] = if is_member(robot) {
+            arrow(pose.heading)
+        } else {
+            hollow_arrow(pose.heading)
+        };
     }
     let rows: Vec<String> = cells.chunks(width).rev().map(String::from_iter).collect();
     rows.join("\n")
@@ -103,6 +125,15 @@ mod tests {
         assert_eq!((grid.width(), grid.height()), (3, 4));
         assert_eq!((poses[0].x, poses[0].y), (2, 1));
         assert_eq!(draw(grid, &poses), drawing);
+    }
+
+    #[test]
+    fn robots_that_are_no_members_are_drawn_hollow() {
+        let (grid, poses) = parse("▶▲·\n··◀\n▼··").unwrap();
+        let drawing = draw_members(grid, &poses, |robot| robot % 2 == 0);
+        assert_eq!(drawing, "▶△·\n··◁\n▼··");
+        let nobody = draw_members(grid, &poses, |_| false);
+        assert_eq!(nobody, "▷△·\n··◁\n▽··");
     }
 
     #[test]

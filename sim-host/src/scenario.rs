@@ -93,6 +93,18 @@ impl Scenario {
             noise: NoiseStream::new(stream(Purpose::Noise), self.noise),
         }
     }
+
+    /// A start of a re-evaluation: new starting poses and noise, the same for every genome, that
+    /// no generation has met.
+    #[must_use]
+    pub fn reevaluation(&self, seeds: SeedTree, start: u32) -> Trial {
+        let stream = |purpose| seeds.stream(purpose, 0, start);
+        let mut starts = stream(Purpose::ReevaluationStarts);
+        Trial {
+            starts: random_poses(self.grid, self.robots, &mut starts),
+            noise: NoiseStream::new(stream(Purpose::ReevaluationNoise), self.noise),
+        }
+    }
 }
 
 /// What differs between the repetitions of an evaluation.
@@ -157,6 +169,22 @@ mod tests {
             .map(|p| (p.x, p.y, p.heading as u8))
             .collect();
         assert_eq!(poses, [(12, 9, 3), (4, 14, 2), (12, 0, 3)]);
+    }
+
+    #[test]
+    fn starts_of_a_re_evaluation_are_new_and_repeatable() {
+        let grid = Grid::new(15, 15).unwrap();
+        let noise = NoiseRate::new(0.5).unwrap();
+        let scenario = Scenario::new(grid, 100, 1, noise).unwrap();
+        let seeds = SeedTree::new(1);
+        let starts = |start| scenario.reevaluation(seeds, start).starts;
+        assert_eq!(starts(4), starts(4));
+        assert_ne!(starts(4), starts(5));
+        assert_ne!(starts(4), scenario.trial(seeds, 0, 4).starts);
+        let flips = |mut trial: Trial| trial.noise.flips(0, 0);
+        let noise_of = |start| flips(scenario.reevaluation(seeds, start));
+        assert_ne!(noise_of(0), noise_of(1));
+        assert_ne!(noise_of(0), flips(scenario.trial(seeds, 0, 0)));
     }
 
     #[test]

@@ -217,7 +217,10 @@ impl Running {
     #[must_use]
     pub fn interrupt(mut self, patience: Duration) -> Finished {
         let id = self.child.id().to_string();
-        let sent = Command::new("kill").args(["-INT", &id]).status();
+        // The shell's own: the program is not part of a bare system.
+        let sent = Command::new("sh")
+            .args(["-c", &format!("kill -INT {id}")])
+            .status();
         assert!(sent.is_ok_and(|status| status.success()), "kill -INT {id}");
         let started = Instant::now();
         let status = loop {

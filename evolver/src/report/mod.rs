@@ -1,5 +1,33 @@
 //! What people and other programs get to see: progress, files, and words at the end.
 
 pub mod progress;
+pub mod reevaluation;
+pub mod structures;
 pub mod summary;
 pub mod tables;
+
+use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+
+/// A table without a frame.
+fn table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table
+        .load_style(presets::NOTHING)
+        .set_content_arrangement(ContentArrangement::Disabled)
+        .set_header(header);
+    table
+}
+
+/// The table with some columns aligned to the right, without spaces at the ends of lines.
+fn right_aligned(mut table: Table, columns: &[usize]) -> String {
+    for &index in columns {
+        if let Some(column) = table.column_mut(index) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    let lines: Vec<String> = table
+        .lines()
+        .map(|line| line.trim_end().to_owned())
+        .collect();
+    lines.join("\n")
+}

@@ -1,18 +1,19 @@
 //! Words and pictures for people at the end of a run, and about a genome.
 
+use super::structures::{self, Classified};
 use crate::experiment::{Experiment, Finding};
 use crate::settings::{describe, model_name};
-use console::Term;
+use console::{Style, Term};
 use minimal_surprise_controller::codec::FORMAT_VERSION;
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{EncodedGenome, KERNEL_ID};
-use minimal_surprise_sim::drawing::draw;
+use minimal_surprise_sim::drawing::draw_members;
 use minimal_surprise_sim::{Grid, Pose};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Columns and rows of the picture when the output is not a terminal.
-const WITHOUT_TERMINAL: (u16, u16) = (120, 60);
+/// Rows and columns of the picture when the output is not a terminal.
+const WITHOUT_TERMINAL: (u16, u16) = (60, 120);
 
 /// How this program was called, for commands that people can copy.
 #[must_use]
@@ -24,42 +25,57 @@ pub fn program() -> &'static str {
     }
 }
 
-/// The swarm's picture, two columns a cell; where it does not fit, a line that says so.
+/// The swarm's picture, two columns a cell, members as filled arrows (coloured on a terminal), the
+/// others hollow; where it does not fit, a line that says so.
 #[must_use]
-pub fn picture(grid: Grid, poses: &[Pose]) -> String {
-    let (rows, columns) = Term::stdout()
-        .size_checked()
-        .unwrap_or((WITHOUT_TERMINAL.1, WITHOUT_TERMINAL.0));
+pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> String {
+    let (rows, columns) = Term::stdout().size_checked().unwrap_or(WITHOUT_TERMINAL);
     if 2 * u32::from(grid.width()) > u32::from(columns) || grid.height() > 4 * rows {
         return format!("(a {grid} grid is too large for this terminal to be drawn)");
     }
-    draw(grid, poses)
+    let member = Style::new().cyan().bold();
+    let cell = |cell: char| {
+        if "▶▲◀▼".contains(cell) {
+            format!(" {}", member.apply_to(cell))
+        } else {
+            format!(" {cell}")
+        }
+    };
+    let lines: Vec<String> = draw_members(grid, poses, is_member)
         .lines()
-        .map(|row| {
-            let cells: Vec<String> = row.chars().map(String::from).collect();
-            format!("  {}", cells.join(" "))
-        })
-        .collect::<Vec<_>>()
-        .join("\n")
+        .map(|row| format!(" {}", row.chars().map(cell).collect::<String>()))
+        .collect();
+    lines.join("\n")
 }
 
 /// What an evolution came to, and what to do next.
 #[must_use]
 pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> String {
     let settings = experiment.settings();
+    let classified = Classified {
+        grid: settings.scenario.grid(),
+        poses: &finding.outcome.final_poses,
+        found: &finding.structures,
+        measures: Some(&finding.measures),
+    };
     let program = program();
     let directory = directory.display();
     format!(
         "{picture}\n\n\
+         structure     {structure}: {share:.0} % of the robots (filled arrows)\n\
          best fitness  {fitness:.4}  (generation {generation}, worst of {repetitions} repetitions)\n\
          seed          {seed}\n\
          hash          {hash}\n\
          run           {directory}\n\n\
          next:\n  \
+         measure the run        {program} classify {directory}\n  \
+         from other starts      {program} evaluate {directory}/best.genome\n  \
          look into the genome   {program} inspect {directory}/best.genome\n  \
          evolve it further      {program} evolve --from {directory}/best.genome\n  \
          the same run again     {program} evolve {directory}/config.toml\n",
-        picture = picture(settings.scenario.grid(), &finding.outcome.final_poses),
+        picture = structures::highlighted(&classified),
+        structure = structures::name(&finding.structures),
+        share = 100.0 * finding.share(),
         fitness = finding.outcome.fitness(),
         generation = finding.provenance.generation,
         repetitions = settings.repetitions,

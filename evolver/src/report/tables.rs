@@ -1,10 +1,12 @@
 //! Contents of the files in a run directory that others read.
 
+use super::structures;
 use crate::experiment::{Experiment, Finding};
 use crate::settings::Settings;
 use minimal_surprise_controller::KERNEL_ID;
 use minimal_surprise_sim::Pose;
 use serde::Serialize;
+use serde_json::Value;
 use serde_json::value::{RawValue, to_raw_value};
 
 /// Version of the layout of `meta.json` and `final.json`.
@@ -53,6 +55,9 @@ struct FinalState<'a> {
     matches: u64,
     scored_bits: u64,
     average_prediction: Vec<f64>,
+    names: Value,
+    share: f64,
+    measures: Value,
     start: Box<RawValue>,
     r#final: Box<RawValue>,
 }
@@ -76,6 +81,9 @@ pub fn final_state(settings: &Settings, finding: &Finding) -> String {
         matches: finding.outcome.matches,
         scored_bits: finding.outcome.scored_bits,
         average_prediction: finding.outcome.average_prediction(),
+        names: structures::name_list(&finding.structures.names()),
+        share: finding.share(),
+        measures: structures::measures_json(&finding.measures),
         start: one_line(&finding.starts),
         r#final: one_line(&finding.outcome.final_poses),
     })

@@ -1,0 +1,61 @@
+//! `evolver classify`: what a swarm formed, and how the run went.
+
+use super::BadInput;
+use crate::files;
+use crate::finished_run::{FinishedRun, parse_final_state};
+use crate::report::structures::{self, Classified};
+use minimal_surprise_sim::exchange::Trajectory;
+use minimal_surprise_sim::structures::classify as find_structures;
+use minimal_surprise_sim::{Grid, Pose, drawing};
+use std::path::Path;
+
+/// Classifies a run directory, a `final.json`, an `agent_trajectory`, or a drawing.
+///
+/// # Errors
+/// [`BadInput`] if there is nothing to classify.
+pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
+    let (grid, poses, measures) = if path.is_dir() {
+        let finished = FinishedRun::read(path).map_err(BadInput::new)?;
+        let measures = finished.measures().map_err(BadInput::new)?;
+        let grid = finished.settings.scenario.grid();
+        (grid, finished.final_poses, Some(measures))
+    } else {
+        let (grid, poses) = read_state(path)?;
+        (grid, poses, None)
+    };
+    let found = find_structures(grid, &poses)
+        .map_err(|error| BadInput::new(format!("{}: {error}", path.display())))?;
+    let classified = Classified {
+        grid,
+        poses: &poses,
+        found: &found,
+        measures: measures.as_ref(),
+    };
+    if json {
+        println!("{}", structures::json(&classified));
+    } else {
+        print!("{}", structures::text(&classified));
+    }
+    Ok(())
+}
+
+/// The last state in a file, by what the file starts with.
+fn read_state(path: &Path) -> Result<(Grid, Vec<Pose>), BadInput> {
+    let bytes = files::read(path).map_err(BadInput::new)?;
+    let text = std::str::from_utf8(&bytes).map_err(|_| {
+        BadInput::new(format!(
+            "{}: neither a final.json, nor an agent_trajectory, nor a drawing",
+            path.display()
+        ))
+    })?;
+    if text.starts_with("Gen:") {
+        let trajectory = Trajectory::read(text)
+            .map_err(|error| BadInput::new(format!("{}, {error}", path.display())))?;
+        Ok((trajectory.grid(), trajectory.final_poses().to_vec()))
+    } else if text.trim_start().starts_with('{') {
+        let state = parse_final_state(path, &bytes).map_err(BadInput::new)?;
+        Ok((state.grid, state.final_poses))
+    } else {
+        drawing::parse(text).map_err(|error| BadInput::new(format!("{}: {error}", path.display())))
+    }
+}

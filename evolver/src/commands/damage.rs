@@ -1,0 +1,115 @@
+//! `evolver damage`: take a part of a structure away, or scatter it, and see what the swarm does.
+
+use super::evaluate::flag;
+use super::{BadInput, thread_pool};
+use crate::finished_run::FinishedRun;
+use crate::reevaluation::resilience;
+use crate::report::reevaluation::{resilience_json, resilience_text};
+use crate::settings::count;
+use clap::Args;
+use minimal_surprise_sim::damage::{Area, Damage};
+use minimal_surprise_sim::structures::{Structure, classify};
+use std::path::PathBuf;
+
+/// What to damage, and how.
+#[derive(Debug, Args)]
+pub struct DamageArgs {
+    /// The run directory.
+    run: PathBuf,
+    /// Corners of the rectangle, ends included; x0 > x1 or y0 > y1 goes across the edge.
+    #[arg(long, value_name = "x0,y0,x1,y1", allow_hyphen_values = true)]
+    area: String,
+    /// Take the robots in the area away.
+    #[arg(
+        long,
+        required_unless_present = "reposition",
+        conflicts_with = "reposition"
+    )]
+    remove: bool,
+    /// Put the robots in the area elsewhere.
+    #[arg(long)]
+    reposition: bool,
+    /// Runs a row.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "20",
+        allow_hyphen_values = true
+    )]
+    repeat: String,
+    /// The structure to follow [default: the one that the run is named after].
+    #[arg(long, value_name = "NAME")]
+    structure: Option<String>,
+    /// Threads [default: one a core]; the result does not depend on them.
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    threads: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Damages the final state of a run.
+///
+/// # Errors
+/// [`BadInput`] names the flag, the value and what would be valid.
+pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
+    let finished = FinishedRun::read(&arguments.run).map_err(BadInput::new)?;
+    let grid = finished.settings.scenario.grid();
+    let [x0, y0, x1, y1] = flag("area", &arguments.area, corners)?;
+    let about_area = |error: &dyn std::fmt::Display| {
+        BadInput::new(format!("--area = {}: {error}", arguments.area))
+    };
+    let area = Area::new(grid, x0, y0, x1, y1).map_err(|error| about_area(&error))?;
+    let damage = if arguments.remove {
+        Damage::Remove(area)
+    } else {
+        Damage::Reposition(area)
+    };
+    let repeat = flag("repeat", &arguments.repeat, |text| count(text, 1_000_000))?;
+    let threads = match &arguments.threads {
+        Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
+        None => None,
+    };
+    let structure = match &arguments.structure {
+        Some(text) => flag("structure", text, structure_named)?,
+        None => {
+            let found = classify(grid, &finished.final_poses).map_err(BadInput::new)?;
+            *found.names().first().ok_or_else(|| {
+                BadInput::new(format!(
+                    "{}: the swarm formed nothing; name a structure with --structure",
+                    arguments.run.display()
+                ))
+            })?
+        }
+    };
+    let rows = thread_pool(threads)?
+        .install(|| resilience(&finished, structure, damage, repeat))
+        .map_err(|error| about_area(&error))?;
+    if arguments.json {
+        println!("{}", resilience_json(structure, &rows));
+    } else {
+        println!("{}", resilience_text(structure, &rows));
+    }
+    Ok(())
+}
+
+fn corners(text: &str) -> Result<[u32; 4], String> {
+    let numbers: Option<Vec<u32>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok())
+        .collect();
+    numbers
+        .and_then(|numbers| numbers.try_into().ok())
+        .ok_or_else(|| "expected four cells from the south-west corner, as in 2,3,6,7".to_owned())
+}
+
+fn structure_named(text: &str) -> Result<Structure, String> {
+    let spaced = text.replace('-', " ");
+    Structure::ALL
+        .into_iter()
+        .find(|structure| structure.name() == spaced)
+        .ok_or_else(|| {
+            let names = Structure::ALL.map(Structure::name);
+            format!("structures are {}", names.join(", "))
+        })
+}

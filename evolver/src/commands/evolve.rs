@@ -1,0 +1,227 @@
+//! `evolver evolve`: evolve a swarm, or go on with a run.
+
+use super::{BadInput, thread_pool};
+use crate::experiment::Experiment;
+use crate::report::progress::{Progress, ProgressMode};
+use crate::report::summary;
+use crate::run_dir::{Found, RunDir};
+use crate::settings::{self, Given, SettingError, Settings};
+use clap::{Args, ValueEnum};
+use minimal_surprise_sim::{Engine, Path as CodePath};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Exit code after Ctrl-C.
+const EXIT_INTERRUPTED: u8 = 130;
+
+/// Settings as flags; a file has the same names. Defaults are the paper's.
+#[derive(Debug, Default, Args)]
+pub struct EvolveArgs {
+    /// TOML file with any of the settings below; flags go before it.
+    config: Option<PathBuf>,
+    /// Width and height of the torus, in cells [default: 15x15].
+    #[arg(long, value_name = "WxH", allow_hyphen_values = true)]
+    grid: Option<String>,
+    /// Swarm size [default: 100].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    robots: Option<String>,
+    /// Sensor model: a, b or c [default: c].
+    #[arg(long, value_name = "MODEL", allow_hyphen_values = true)]
+    sensor_model: Option<String>,
+    /// Probability that a sensor bit is flipped [default: 0].
+    #[arg(long, value_name = "P", allow_hyphen_values = true)]
+    noise: Option<String>,
+    /// Fix all predictions to a template: line, pair, square or triangular-lattice.
+    #[arg(long, value_name = "TEMPLATE", allow_hyphen_values = true)]
+    predefine: Option<String>,
+    /// Fix only the predictions that the template sets: line (sensor model c).
+    #[arg(long, value_name = "TEMPLATE", allow_hyphen_values = true)]
+    predefine_partly: Option<String>,
+    /// Genomes of a generation [default: 50].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    population: Option<String>,
+    /// Generations [default: 100].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    generations: Option<String>,
+    /// Repetitions of an evaluation; the worst counts [default: 10].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    repetitions: Option<String>,
+    /// Steps of a repetition [default: 500].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    steps: Option<String>,
+    /// Probability that a weight mutates [default: 0.1; 0.3 for the partly predefined line on
+    /// 20x20].
+    #[arg(long, value_name = "P", allow_hyphen_values = true)]
+    mutation: Option<String>,
+    /// Start from a genome and its mutants.
+    #[arg(long, value_name = "GENOME")]
+    from: Option<String>,
+    /// Root of all random numbers; drawn and printed if not given.
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    seed: Option<String>,
+    /// Threads [default: one a core]; the result does not depend on them.
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    threads: Option<String>,
+    /// Directory of the run; must not exist [default: a new one in runs/].
+    #[arg(long, value_name = "DIR")]
+    out: Option<String>,
+    /// Go on with a run that was interrupted, under the settings in its directory.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["config", "grid", "robots",
+        "sensor_model", "noise", "predefine", "predefine_partly", "population", "generations",
+        "repetitions", "steps", "mutation", "from", "seed", "out"])]
+    resume: Option<PathBuf>,
+    /// How progress is shown.
+    #[arg(long, value_enum, default_value_t)]
+    progress: ProgressMode,
+    /// What evaluates; the result does not depend on it.
+    #[arg(long, value_enum, default_value_t)]
+    engine: EngineName,
+}
+
+impl EvolveArgs {
+    /// All settings given, flags before the file.
+    fn given(&self) -> Result<Given, SettingError> {
+        let mut given = Given::default();
+        let flags = [
+            ("grid", &self.grid),
+            ("robots", &self.robots),
+            ("sensor-model", &self.sensor_model),
+            ("noise", &self.noise),
+            ("predefine", &self.predefine),
+            ("predefine-partly", &self.predefine_partly),
+            ("population", &self.population),
+            ("generations", &self.generations),
+            ("repetitions", &self.repetitions),
+            ("steps", &self.steps),
+            ("mutation", &self.mutation),
+            ("from", &self.from),
+            ("seed", &self.seed),
+            ("threads", &self.threads),
+            ("out", &self.out),
+        ];
+        for (key, value) in flags {
+            given.flag(key, value.as_deref());
+        }
+        if let Some(path) = &self.config {
+            given.file(path)?;
+        }
+        Ok(given)
+    }
+}
+
+/// What evaluates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum EngineName {
+    /// The straight program.
+    Plain,
+    /// The fast one, by the best instructions that this processor has; the environment variable
+    /// MINIMAL_SURPRISE_PATH forces portable, avx2 or avx512.
+    #[default]
+    Fast,
+}
+
+/// How to run, whatever is run; no result depends on it.
+#[derive(Clone, Copy, Debug)]
+struct Manner {
+    progress: ProgressMode,
+    engine: Engine,
+    path: CodePath,
+}
+
+/// Evolves a swarm.
+///
+/// # Errors
+/// [`BadInput`] before anything is written; other errors leave a run that can be resumed.
+pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
+    let given = arguments.given().map_err(BadInput::new)?;
+    let threads = settings::threads(&given).map_err(BadInput::new)?;
+    let manner = Manner {
+        progress: arguments.progress,
+        engine: match arguments.engine {
+            EngineName::Plain => Engine::Plain,
+            EngineName::Fast => Engine::Fast,
+        },
+        path: CodePath::from_environment().map_err(BadInput::new)?,
+    };
+    let (experiment, run) = match &arguments.resume {
+        Some(directory) => match RunDir::open(directory)? {
+            Found::Unfinished(experiment, run) => (*experiment, run),
+            Found::Finished(hash) => {
+                println!("{} is complete; its hash is {hash}", directory.display());
+                return Ok(ExitCode::SUCCESS);
+            }
+        },
+        None => {
+            let settings = Settings::resolve(&given, rand::random).map_err(BadInput::new)?;
+            if given.place("seed").is_none() && arguments.progress != ProgressMode::Json {
+                println!("seed {} (drawn)", settings.seed);
+            }
+            let experiment = Experiment::new(settings);
+            let run = match settings::out(&given) {
+                Some(path) => RunDir::create(&path, &experiment),
+                None => RunDir::create_named(Path::new("runs"), &experiment),
+            }
+            .map_err(|error| BadInput::new(format!("--out: {error}")))?;
+            (experiment, run)
+        }
+    };
+    let stop = stop_on_ctrl_c()?;
+    thread_pool(threads)?.install(|| generations(experiment, &run, manner, &stop))
+}
+
+/// Evaluates the generations that are left, saving each, and reports.
+fn generations(
+    mut experiment: Experiment,
+    run: &RunDir,
+    manner: Manner,
+    stop: &AtomicBool,
+) -> anyhow::Result<ExitCode> {
+    let done = experiment.history().len() as u32;
+    let progress = Progress::start(manner.progress, experiment.settings(), done);
+    while !experiment.is_finished() {
+        if stop.load(Ordering::Relaxed) {
+            progress.end();
+            let program = summary::program();
+            let directory = run.path().display();
+            eprintln!("interrupted; go on with: {program} evolve --resume {directory}");
+            return Ok(ExitCode::from(EXIT_INTERRUPTED));
+        }
+        let record = experiment.advance(manner.engine, manner.path);
+        run.save(&experiment)?;
+        progress.generation(&record);
+    }
+    progress.end();
+    let finding = experiment
+        .finding()?
+        .ok_or_else(|| anyhow::anyhow!("an evolution has at least one generation"))?;
+    run.finish(&experiment, &finding)?;
+    if manner.progress == ProgressMode::Json {
+        let done = serde_json::json!({
+            "event": "done",
+            "fitness": finding.outcome.fitness(),
+            "seed": experiment.settings().seed,
+            "hash": finding.hash.to_string(),
+            "run": run.path(),
+        });
+        println!("{done}");
+    } else {
+        print!("\n{}", summary::evolved(&experiment, &finding, run.path()));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The first Ctrl-C asks for an end after this generation, the second ends at once; both leave a
+/// run that can be resumed.
+fn stop_on_ctrl_c() -> Result<Arc<AtomicBool>, ctrlc::Error> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    ctrlc::set_handler(move || {
+        if asked.swap(true, Ordering::Relaxed) {
+            std::process::exit(EXIT_INTERRUPTED.into());
+        }
+        eprintln!("\nending after this generation; Ctrl-C again ends at once");
+    })?;
+    Ok(stop)
+}

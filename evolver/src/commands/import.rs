@@ -1,0 +1,170 @@
+//! `evolver import`: genome containers of the genome text of the authors' program.
+
+use super::BadInput;
+use super::evaluate::flag;
+use crate::files;
+use crate::settings::{Given, describe, resolve_topology};
+use clap::Args;
+use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
+use minimal_surprise_controller::{Prediction, Provenance, SensorModel, Template, Topology};
+use minimal_surprise_sim::exchange::{
+    ExchangeError, GenomeRows, ImportedGenome, import_genome, read_genomes,
+};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The text files, and what they hold.
+#[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// The `action_genomes` file.
+    #[arg(long, value_name = "FILE")]
+    action: PathBuf,
+    /// The `prediction_genomes` file; not needed where all predictions are predefined.
+    #[arg(long, value_name = "FILE")]
+    prediction: Option<PathBuf>,
+    /// Import only this generation.
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    generation: Option<String>,
+    /// Sensor model: a, b or c [default: by the length of the rows].
+    #[arg(long, value_name = "MODEL")]
+    sensor_model: Option<String>,
+    /// All predictions were fixed to this template.
+    #[arg(long, value_name = "TEMPLATE")]
+    predefine: Option<String>,
+    /// The predictions that this template sets were fixed [default: by the length of the rows].
+    #[arg(long, value_name = "TEMPLATE")]
+    predefine_partly: Option<String>,
+    /// Directory for the genomes; must not exist.
+    #[arg(long, value_name = "DIR", default_value = "imported")]
+    out: PathBuf,
+}
+
+/// Imports genomes.
+///
+/// # Errors
+/// [`BadInput`] names the file and the line.
+pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
+    let action = read(&arguments.action)?;
+    let prediction = arguments.prediction.as_deref().map(read).transpose()?;
+    let topology = topology(arguments, &action)?;
+    if let Some(prediction) = &prediction
+        && prediction.len() != action.len()
+    {
+        return Err(BadInput::new(format!(
+            "{} holds {} generations, {} holds {}",
+            arguments.action.display(),
+            action.len(),
+            arguments
+                .prediction
+                .as_deref()
+                .unwrap_or(Path::new(""))
+                .display(),
+            prediction.len()
+        ))
+        .into());
+    }
+    let generations = match &arguments.generation {
+        None => 0..action.len(),
+        Some(text) => {
+            let chosen = flag("generation", text, |text| match text.parse() {
+                Ok(generation) if generation < action.len() => Ok(generation),
+                _ => Err(format!(
+                    "the file holds generations 0 to {}",
+                    action.len() - 1
+                )),
+            })?;
+            chosen..chosen + 1
+        }
+    };
+    let imported = generations
+        .map(|generation| {
+            let prediction = prediction.as_ref().map(|rows| &rows[generation]);
+            import_genome(topology, &action[generation], prediction)
+                .map(|genome| (generation as u32, genome))
+        })
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(BadInput::new)?;
+    match fs::create_dir(&arguments.out) {
+        Err(error) => {
+            let out = arguments.out.display();
+            return Err(BadInput::new(format!("--out = {out}: {error}")).into());
+        }
+        Ok(()) => write(&arguments.out, &imported)?,
+    }
+    print!("{}", report(topology, &arguments.out, &imported));
+    Ok(())
+}
+
+fn read(path: &Path) -> Result<Vec<GenomeRows>, BadInput> {
+    let bytes = files::read(path).map_err(BadInput::new)?;
+    read_genomes(&String::from_utf8_lossy(&bytes))
+        .map_err(|error: ExchangeError| BadInput::new(format!("{}, {error}", path.display())))
+}
+
+/// As the flags say; what they leave open, by the length to which rows are filled up.
+fn topology(arguments: &ImportArgs, action: &[GenomeRows]) -> Result<Topology, BadInput> {
+    let length = action.first().map_or(0, |rows| rows.rows[0].len());
+    let mut given = Given::default();
+    given.flag("sensor-model", arguments.sensor_model.as_deref());
+    given.flag("predefine", arguments.predefine.as_deref());
+    given.flag("predefine-partly", arguments.predefine_partly.as_deref());
+    let model = match length {
+        80 => "a",
+        48 => "b",
+        _ => "c",
+    };
+    given.flag_if_missing("sensor-model", model);
+    let free = given.place("predefine").is_none() && given.place("predefine-partly").is_none();
+    let topology = resolve_topology(&given).map_err(BadInput::new)?;
+    if free && arguments.prediction.is_none() {
+        return Err(BadInput::new(
+            "--prediction is missing; without it, name the template with --predefine",
+        ));
+    }
+    if free && topology.model() == SensorModel::C && length == 192 {
+        let partly = Prediction::PartlyPredefined(Template::Line);
+        return Topology::new(SensorModel::C, partly).map_err(BadInput::new);
+    }
+    Ok(topology)
+}
+
+fn write(directory: &Path, imported: &[(u32, ImportedGenome)]) -> anyhow::Result<()> {
+    for (generation, imported) in imported {
+        let provenance = Provenance {
+            generation: *generation,
+            ..Provenance::default()
+        };
+        let mut buffer = [0; CONTAINER_BYTES_MAX];
+        let bytes = codec::encode(&imported.genome, provenance, &mut buffer)?;
+        files::replace(&directory.join(name(*generation)), bytes)?;
+    }
+    Ok(())
+}
+
+fn name(generation: u32) -> String {
+    format!("generation-{generation}.genome")
+}
+
+fn report(topology: Topology, directory: &Path, imported: &[(u32, ImportedGenome)]) -> String {
+    let mut text = format!("{}, {} weights\n", describe(topology), topology.weights());
+    for (generation, imported) in imported {
+        let path = directory.join(name(*generation));
+        text += &format!(
+            "{}: largest rounding {:.2e}, {} weights that did not fit\n",
+            path.display(),
+            imported.rounding_error_max,
+            imported.saturated.len()
+        );
+        for weight in &imported.saturated {
+            text += &format!(
+                "  {} genomes, line {}, number {}: {} became {:.4}\n",
+                weight.network,
+                weight.line,
+                weight.column,
+                weight.value,
+                f64::from(weight.weight_q3_12) / 4096.0
+            );
+        }
+    }
+    text
+}

@@ -1,0 +1,270 @@
+//! Reading a complete run directory back: the genome, where it started from, where it ended.
+
+use crate::files::{self, FileError};
+use crate::settings::{Given, SettingError, Settings};
+use minimal_surprise_controller::{Controller, DecodeError, EncodedGenome, Genome, Provenance};
+use minimal_surprise_sim::evaluation::run;
+use minimal_surprise_sim::metrics::Measures;
+use minimal_surprise_sim::world::check_poses;
+use minimal_surprise_sim::{Grid, Pose, SeedTree, Trace, Trial, World, WorldError};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// A run that is complete.
+#[derive(Clone, Debug)]
+pub struct FinishedRun {
+    /// Its settings.
+    pub settings: Settings,
+    /// Its result: the last generation's best genome.
+    pub genome: Genome,
+    /// Where the genome comes from.
+    pub provenance: Provenance,
+    /// The repetition that gave the genome its fitness.
+    pub repetition: u32,
+    /// Where the swarm started from in that repetition.
+    pub starts: Vec<Pose>,
+    /// Where it ended.
+    pub final_poses: Vec<Pose>,
+    /// The run's hash.
+    pub hash: String,
+}
+
+/// A run directory cannot be read back.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadRunError {
+    /// The run has not ended, or there is none.
+    #[error("{} holds no complete run: it has no {missing}", path.display())]
+    NotComplete {
+        /// The directory.
+        path: PathBuf,
+        /// The file that is missing.
+        missing: &'static str,
+    },
+    /// A file cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The settings are wrong.
+    #[error(transparent)]
+    Settings(#[from] SettingError),
+    /// The genome is not one this program runs.
+    #[error("{}: {error}", path.display())]
+    Genome {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: DecodeError,
+    },
+    /// A final state is not one.
+    #[error(transparent)]
+    State(#[from] StateError),
+    /// The directory's files do not belong together.
+    #[error("{}: {problem}", path.display())]
+    Inconsistent {
+        /// The directory.
+        path: PathBuf,
+        /// What does not fit.
+        problem: &'static str,
+    },
+}
+
+/// A file holds no final state.
+#[derive(Debug, thiserror::Error)]
+pub enum StateError {
+    /// It is not the JSON that it should be.
+    #[error("{}: {error}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with line and column.
+        error: serde_json::Error,
+    },
+    /// It has another layout.
+    #[error("{}: schema version {found}; this program reads version {}", path.display(), crate::report::tables::SCHEMA_VERSION)]
+    OtherSchema {
+        /// The file.
+        path: PathBuf,
+        /// The version found.
+        found: u32,
+    },
+    /// The grid is not one.
+    #[error("{}: grid = {value}: {problem}", path.display())]
+    Grid {
+        /// The file.
+        path: PathBuf,
+        /// The value.
+        value: String,
+        /// What is wrong and what would be valid.
+        problem: String,
+    },
+    /// The robots do not fit the grid.
+    #[error("{}: {error}", path.display())]
+    Poses {
+        /// The file.
+        path: PathBuf,
+        /// Which robot.
+        error: WorldError,
+    },
+}
+
+/// What is read of a `final.json`.
+#[derive(Clone, Debug)]
+pub struct FinalState {
+    /// The grid.
+    pub grid: Grid,
+    /// Where the swarm started from.
+    pub starts: Vec<Pose>,
+    /// Where it ended.
+    pub final_poses: Vec<Pose>,
+    /// The repetition that it was run from.
+    pub repetition: u32,
+}
+
+#[derive(Deserialize)]
+struct VersionOnly {
+    schema_version: u32,
+}
+
+#[derive(Deserialize)]
+struct FinalFile {
+    grid: String,
+    repetition: u32,
+    start: Vec<Pose>,
+    r#final: Vec<Pose>,
+}
+
+/// Reads a `final.json`.
+///
+/// # Errors
+/// [`StateError`] names the file and the place.
+pub fn parse_final_state(path: &Path, bytes: &[u8]) -> Result<FinalState, StateError> {
+    let json = |error| StateError::Json {
+        path: path.to_owned(),
+        error,
+    };
+    let version: VersionOnly = serde_json::from_slice(bytes).map_err(json)?;
+    if version.schema_version != crate::report::tables::SCHEMA_VERSION {
+        return Err(StateError::OtherSchema {
+            path: path.to_owned(),
+            found: version.schema_version,
+        });
+    }
+    let file: FinalFile = serde_json::from_slice(bytes).map_err(json)?;
+    let grid = crate::settings::parse_grid(&file.grid).map_err(|problem| StateError::Grid {
+        path: path.to_owned(),
+        value: file.grid.clone(),
+        problem,
+    })?;
+    for poses in [&file.start, &file.r#final] {
+        check_poses(grid, poses).map_err(|error| StateError::Poses {
+            path: path.to_owned(),
+            error,
+        })?;
+    }
+    Ok(FinalState {
+        grid,
+        starts: file.start,
+        final_poses: file.r#final,
+        repetition: file.repetition,
+    })
+}
+
+impl FinishedRun {
+    /// Reads a run directory.
+    ///
+    /// # Errors
+    /// [`ReadRunError`] if the run is not complete, or a file in it is wrong.
+    pub fn read(path: &Path) -> Result<Self, ReadRunError> {
+        for missing in ["DONE", "config.toml", "best.genome", "final.json"] {
+            if !path.join(missing).is_file() {
+                return Err(ReadRunError::NotComplete {
+                    path: path.to_owned(),
+                    missing,
+                });
+            }
+        }
+        let mut given = Given::default();
+        given.file(&path.join("config.toml"))?;
+        given.forget("from");
+        let settings = Settings::resolve(&given, || 0)?;
+        let genome_path = path.join("best.genome");
+        let bytes = files::read(&genome_path)?;
+        let encoded = EncodedGenome::decode(&bytes).map_err(|error| ReadRunError::Genome {
+            path: genome_path,
+            error,
+        })?;
+        let state_path = path.join("final.json");
+        let state = parse_final_state(&state_path, &files::read(&state_path)?)?;
+        let inconsistent = |problem| {
+            Err(ReadRunError::Inconsistent {
+                path: path.to_owned(),
+                problem,
+            })
+        };
+        if encoded.topology() != settings.topology {
+            return inconsistent("best.genome has another topology than config.toml");
+        }
+        if state.grid != settings.scenario.grid()
+            || state.starts.len() != settings.scenario.robots() as usize
+        {
+            return inconsistent("final.json has another grid or swarm size than config.toml");
+        }
+        let hash = files::read(&path.join("DONE"))?;
+        Ok(Self {
+            genome: encoded.to_genome(),
+            provenance: encoded.provenance(),
+            repetition: state.repetition,
+            starts: state.starts,
+            final_poses: state.final_poses,
+            hash: String::from_utf8_lossy(&hash).trim().to_owned(),
+            settings,
+        })
+    }
+
+    /// The trial that the final state came out of: its start and its noise.
+    #[must_use]
+    pub fn trial(&self) -> Trial {
+        let seeds = SeedTree::new(self.settings.seed);
+        let generation = self.provenance.generation;
+        let drawn = self
+            .settings
+            .scenario
+            .trial(seeds, generation, self.repetition);
+        Trial {
+            starts: self.starts.clone(),
+            noise: drawn.noise,
+        }
+    }
+
+    /// Runs the genome once more from its start, showing every step.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the starting poses do not fit the grid.
+    pub fn replay(&self, observe: impl FnMut(&World)) -> Result<(), WorldError> {
+        let controller = Controller::new(&self.genome);
+        run(&controller, &self.settings.scenario, &self.trial(), observe).map(|_| ())
+    }
+
+    /// The measures of the run.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the starting poses do not fit the grid.
+    pub fn measures(&self) -> Result<Measures, WorldError> {
+        let grid = self.settings.scenario.grid();
+        let mut measures = Measures::starting_from(grid, self.settings.topology, &self.starts);
+        self.replay(|world| measures.observe(world))?;
+        Ok(measures)
+    }
+
+    /// Everything that happened in the run.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the starting poses do not fit the grid.
+    pub fn trace(&self) -> Result<Trace, WorldError> {
+        let mut trace = Trace {
+            steps: Vec::new(),
+            final_poses: self.starts.clone(),
+        };
+        self.replay(|world| trace.record(world))?;
+        Ok(trace)
+    }
+}

@@ -1,0 +1,189 @@
+//! Tables of re-evaluations and of resilience to damage.
+
+use super::structures::{name_list, names_in_words};
+use crate::reevaluation::{Rerun, ResilienceRow, mean, median};
+use minimal_surprise_sim::Scenario;
+use minimal_surprise_sim::structures::{LineOrientation, Structure};
+use serde_json::{Map, Value, json};
+
+/// One combination of conditions, and its runs.
+#[derive(Clone, Debug)]
+pub struct Condition {
+    /// The conditions.
+    pub scenario: Scenario,
+    /// Noise as it was given.
+    pub noise: f64,
+    /// The runs, by start.
+    pub reruns: Vec<Rerun>,
+}
+
+/// How often each structure gave a run its name; a tie of k counts 1/k for each.
+#[must_use]
+pub fn name_counts(reruns: &[Rerun]) -> Vec<(Structure, f64)> {
+    let count = |structure| {
+        let named = reruns
+            .iter()
+            .filter(|rerun| rerun.names.contains(&structure));
+        named
+            .map(|rerun| 1.0 / rerun.names.len() as f64)
+            .sum::<f64>()
+    };
+    let counts = Structure::ALL.map(|structure| (structure, count(structure)));
+    counts.into_iter().filter(|&(_, n)| n > 0.0).collect()
+}
+
+fn fitnesses(reruns: &[Rerun]) -> Vec<f64> {
+    reruns.iter().map(|rerun| rerun.fitness).collect()
+}
+
+/// Which way lines run in most of the runs; none where no run has lines.
+fn orientation(reruns: &[Rerun]) -> String {
+    let runs: Vec<Option<LineOrientation>> = reruns.iter().map(|r| r.orientation).collect();
+    if runs.iter().all(Option::is_none) {
+        return String::new();
+    }
+    LineOrientation::of_most(&runs).map_or("diverse".to_owned(), |most| most.name().to_owned())
+}
+
+/// A table over conditions for people.
+#[must_use]
+pub fn conditions_text(conditions: &[Condition]) -> String {
+    let mut table = super::table(&[
+        "grid",
+        "robots",
+        "noise",
+        "mean fitness",
+        "median",
+        "structures",
+        "lines",
+    ]);
+    for condition in conditions {
+        let values = fitnesses(&condition.reruns);
+        let structures: Vec<String> = name_counts(&condition.reruns)
+            .into_iter()
+            .map(|(structure, count)| format!("{} {}", plain(count), structure.name()))
+            .collect();
+        table.add_row([
+            condition.scenario.grid().to_string(),
+            condition.scenario.robots().to_string(),
+            condition.noise.to_string(),
+            format!("{:.4}", mean(&values)),
+            format!("{:.4}", median(&values)),
+            structures.join(", "),
+            orientation(&condition.reruns),
+        ]);
+    }
+    super::right_aligned(table, &[1, 2, 3, 4])
+}
+
+/// A count without needless decimals.
+fn plain(count: f64) -> String {
+    let text = format!("{count:.2}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// The same for programs.
+#[must_use]
+pub fn conditions_json(conditions: &[Condition], seed: u64) -> Value {
+    let rows: Vec<Value> = conditions
+        .iter()
+        .map(|condition| {
+            let values = fitnesses(&condition.reruns);
+            let mut names = Map::new();
+            for (structure, count) in name_counts(&condition.reruns) {
+                names.insert(structure.name().to_owned(), count.into());
+            }
+            let starts: Vec<Value> = condition
+                .reruns
+                .iter()
+                .map(|rerun| {
+                    json!({
+                        "fitness": rerun.fitness,
+                        "names": name_list(&rerun.names),
+                        "orientation": rerun.orientation.map(|o| o.name()),
+                    })
+                })
+                .collect();
+            json!({
+                "grid": condition.scenario.grid().to_string(),
+                "robots": condition.scenario.robots(),
+                "noise": condition.noise,
+                "steps": condition.scenario.steps(),
+                "mean_fitness": mean(&values),
+                "median_fitness": median(&values),
+                "structures": names,
+                "starts": starts,
+            })
+        })
+        .collect();
+    json!({
+        "schema_version": super::tables::SCHEMA_VERSION,
+        "seed": seed,
+        "conditions": rows,
+    })
+}
+
+/// Rows of Tables 7 and 8 for people: mean, and median in brackets where there are several runs.
+#[must_use]
+pub fn resilience_text(structure: Structure, rows: &[ResilienceRow]) -> String {
+    let mut table = super::table(&[
+        "",
+        "runs",
+        "robots",
+        "fitness",
+        "in structure, start",
+        "end",
+        "similarity",
+    ]);
+    for row in rows {
+        let value = |values: &[f64], scale: f64, decimals: usize| {
+            let mean = format!("{:.decimals$}", scale * mean(values));
+            if values.len() == 1 {
+                mean
+            } else {
+                format!("{mean} ({:.decimals$})", scale * median(values))
+            }
+        };
+        table.add_row([
+            row.name.clone(),
+            row.fitness.len().to_string(),
+            plain(mean(&row.robots)),
+            value(&row.fitness, 1.0, 3),
+            value(&row.share_start, 100.0, 1) + " %",
+            value(&row.share_end, 100.0, 1) + " %",
+            value(&row.similarity, 1.0, 3),
+        ]);
+    }
+    format!(
+        "structure: {}; mean (median)\n\n{}",
+        names_in_words(&[structure]),
+        super::right_aligned(table, &[1, 2, 3, 4, 5, 6])
+    )
+}
+
+/// The same for programs, with the values of every run.
+#[must_use]
+pub fn resilience_json(structure: Structure, rows: &[ResilienceRow]) -> Value {
+    let rows: Vec<Value> = rows
+        .iter()
+        .map(|row| {
+            let column = |values: &[f64]| {
+                json!({ "mean": mean(values), "median": median(values), "values": values })
+            };
+            json!({
+                "name": row.name,
+                "runs": row.fitness.len(),
+                "robots": column(&row.robots),
+                "fitness": column(&row.fitness),
+                "share_start": column(&row.share_start),
+                "share_end": column(&row.share_end),
+                "similarity": column(&row.similarity),
+            })
+        })
+        .collect();
+    json!({
+        "schema_version": super::tables::SCHEMA_VERSION,
+        "structure": structure.name(),
+        "rows": rows,
+    })
+}

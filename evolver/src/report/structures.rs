@@ -1,0 +1,183 @@
+//! What a swarm formed, as a picture and a table or as JSON.
+
+use super::summary::picture;
+use minimal_surprise_sim::metrics::Measures;
+use minimal_surprise_sim::structures::{LineCounts, Structure, Structures};
+use minimal_surprise_sim::{Grid, Pose};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+
+/// A state, what it formed, and, where a run is known, how it went.
+#[derive(Clone, Copy, Debug)]
+pub struct Classified<'a> {
+    /// The grid.
+    pub grid: Grid,
+    /// The state.
+    pub poses: &'a [Pose],
+    /// Its structures.
+    pub found: &'a Structures,
+    /// Measures of the run that led there.
+    pub measures: Option<&'a Measures>,
+}
+
+/// The run's name in words: `lines`, `lines and pairs (tied)`, `nothing`.
+#[must_use]
+pub fn name(found: &Structures) -> String {
+    names_in_words(&found.names())
+}
+
+/// Names in words.
+#[must_use]
+pub fn names_in_words(names: &[Structure]) -> String {
+    let words: Vec<&str> = names.iter().map(|structure| structure.name()).collect();
+    match words.as_slice() {
+        [] => "nothing".to_owned(),
+        [one] => (*one).to_owned(),
+        several => format!("{} (tied)", several.join(" and ")),
+    }
+}
+
+/// The picture: the robots of the structure that the run is named after stand out.
+#[must_use]
+pub fn highlighted(classified: &Classified<'_>) -> String {
+    let Classified {
+        grid, poses, found, ..
+    } = *classified;
+    let names = found.names();
+    picture(grid, poses, |robot| {
+        names
+            .iter()
+            .any(|&structure| found.contains(structure, robot))
+    })
+}
+
+/// For people.
+#[must_use]
+pub fn text(classified: &Classified<'_>) -> String {
+    let Classified {
+        grid,
+        poses,
+        found,
+        measures,
+    } = classified;
+    let mut text = highlighted(classified);
+    let _ = write!(
+        text,
+        "\n\n{} robots on {grid}: {}\n\n",
+        poses.len(),
+        name(found)
+    );
+    let mut table = super::table(&["structure", "robots", "share", ""]);
+    for structure in Structure::ALL {
+        table.add_row([
+            structure.name().to_owned(),
+            found.count(structure).to_string(),
+            format!("{:.1} %", 100.0 * found.share(structure)),
+            details(found, structure),
+        ]);
+    }
+    let _ = writeln!(text, "{}", super::right_aligned(table, &[1, 2]));
+    if let Some(measures) = measures {
+        let temperature = measures.temperature();
+        let last = temperature.last().copied().unwrap_or(0.0);
+        let _ = write!(
+            text,
+            "\nfitness            {:.4}\n\
+             movement           {:.4}   (last {period} steps)\n\
+             intended movement  {:.4}   (last {period} steps)\n\
+             temperature        {last:.4}   (last step)\n",
+            measures.fitness(),
+            measures.movement(),
+            measures.intended_movement(),
+            period = measures.period(),
+        );
+    }
+    text
+}
+
+fn details(found: &Structures, structure: Structure) -> String {
+    match structure {
+        Structure::Line if !found.lines().is_empty() => {
+            let LineCounts {
+                horizontal,
+                vertical,
+                spanning,
+            } = found.line_counts();
+            let orientation = found.line_counts().orientation();
+            let orientation = orientation.map_or("", |orientation| orientation.name());
+            format!(
+                "{horizontal} horizontal, {vertical} vertical, {spanning} spanning: {orientation}"
+            )
+        }
+        Structure::Pair if !found.pairs().is_empty() => format!("{} pairs", found.pairs().len()),
+        Structure::Aggregation | Structure::Clustering | Structure::LooseGrouping
+            if found.count(structure) > 0 =>
+        {
+            let clusters = found.clusters();
+            format!(
+                "{} clusters, {} connections",
+                clusters.clusters().len(),
+                clusters.connections()
+            )
+        }
+        _ => String::new(),
+    }
+}
+
+/// For programs.
+#[must_use]
+pub fn json(classified: &Classified<'_>) -> Value {
+    let found = classified.found;
+    let mut structures = Map::new();
+    for structure in Structure::ALL {
+        let members: Vec<u32> = found.robots_in(structure).collect();
+        structures.insert(
+            structure.name().to_owned(),
+            json!({
+                "robots": found.count(structure),
+                "share": found.share(structure),
+                "members": members,
+            }),
+        );
+    }
+    let lines = found.line_counts();
+    let clusters = found.clusters();
+    json!({
+        "schema_version": super::tables::SCHEMA_VERSION,
+        "grid": classified.grid.to_string(),
+        "robots": classified.poses.len(),
+        "names": name_list(&found.names()),
+        "structures": structures,
+        "lines": {
+            "horizontal": lines.horizontal,
+            "vertical": lines.vertical,
+            "spanning": lines.spanning,
+            "orientation": lines.orientation().map(|orientation| orientation.name()),
+        },
+        "clusters": {
+            "clusters": clusters.clusters().len(),
+            "connections": clusters.connections(),
+        },
+        "average_prediction": classified.measures.map(Measures::average_prediction),
+        "measures": classified.measures.map(measures_json),
+    })
+}
+
+/// Names as JSON.
+#[must_use]
+pub fn name_list(names: &[Structure]) -> Value {
+    names.iter().map(|structure| structure.name()).collect()
+}
+
+/// Measures of a run as JSON.
+#[must_use]
+pub fn measures_json(measures: &Measures) -> Value {
+    json!({
+        "fitness": measures.fitness(),
+        "movement": measures.movement(),
+        "intended_movement": measures.intended_movement(),
+        "period_steps": measures.period(),
+        "temperature": measures.temperature(),
+        "surprise": measures.surprise(),
+    })
+}

@@ -1,0 +1,95 @@
+//! Counting instructions under QEMU.
+//!
+//! With `-icount`, QEMU's clock advances by a fixed time an instruction, and SysTick counts that
+//! time. How many ticks an instruction takes is found out with a block of `nop`s. These are
+//! instructions executed, not cycles: QEMU does not model a pipeline, and on the chip some
+//! instructions take more than one cycle.
+
+use core::sync::atomic::{Ordering, compiler_fence};
+use cortex_m::asm::nop;
+use cortex_m::peripheral::SYST;
+use cortex_m::peripheral::syst::SystClkSource;
+
+/// SysTick counts down from here.
+const RELOAD: u32 = 0x00ff_ffff;
+
+/// `nop`s of the calibration.
+const NOPS: u32 = 1000;
+
+/// Counts the instructions of a piece of work.
+pub struct Counter {
+    /// Ticks of reading the clock twice.
+    empty_ticks: u32,
+    /// Ticks of [`NOPS`] instructions.
+    nops_ticks: u32,
+}
+
+impl Counter {
+    /// Starts SysTick and calibrates it. `None` if it does not follow the instructions, as without
+    /// `-icount`.
+    #[must_use]
+    pub fn new(mut systick: SYST) -> Option<Self> {
+        systick.set_clock_source(SystClkSource::Core);
+        systick.set_reload(RELOAD);
+        systick.clear_current();
+        systick.enable_counter();
+        let empty_ticks = ticks(|| ());
+        let nops_ticks = ticks(|| {
+            ten!(ten!(ten!(nop())));
+        });
+        let counter = Self {
+            empty_ticks,
+            nops_ticks: nops_ticks.checked_sub(empty_ticks)?,
+        };
+        let again = ticks(|| {
+            ten!(ten!(ten!(nop())));
+            ten!(ten!(ten!(nop())));
+        });
+        (counter.nops_ticks > NOPS && counter.instructions(again).abs_diff(2 * NOPS) <= 1)
+            .then_some(counter)
+    }
+
+    /// Instructions of `work`, and its result. Up to about 650,000: then SysTick wraps around.
+    pub fn count<T>(&self, work: impl FnOnce() -> T) -> (u32, T) {
+        let mut result = None;
+        let ticks = ticks(|| result = Some(work()));
+        match result {
+            Some(result) => (self.instructions(ticks), result),
+            None => unreachable!("the work was done"),
+        }
+    }
+
+    fn instructions(&self, ticks: u32) -> u32 {
+        let scaled = u64::from(ticks.saturating_sub(self.empty_ticks)) * u64::from(NOPS);
+        let nops_ticks = u64::from(self.nops_ticks);
+        ((scaled + nops_ticks / 2) / nops_ticks) as u32
+    }
+}
+
+/// Ten times the same.
+macro_rules! ten {
+    ($work:expr) => {
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
+        $work;
+    };
+}
+use ten;
+
+/// Ticks from before `work` to behind it.
+#[inline(always)]
+fn ticks(work: impl FnOnce()) -> u32 {
+    let start = SYST::get_current();
+    compiler_fence(Ordering::SeqCst);
+    work();
+    compiler_fence(Ordering::SeqCst);
+    let end = SYST::get_current();
+    start.wrapping_sub(end) & RELOAD
+}

@@ -1,0 +1,83 @@
+#!/bin/sh
+# Runs cargo for a Cortex-M4, e.g. in firmware-example:
+#
+#     ../scripts/thumb-cargo.sh build --release [--target thumbv7em-none-eabi]
+#     scripts/thumb-cargo.sh --compiler [--target …]       only finds the compiler and names it
+#
+# The target's core library comes from the first of these that works:
+#
+#   1. the Rust toolchain in use has it;
+#   2. rustup adds it;
+#   3. the system's Rust builds it from source. With PROVIDE_TOOLS=1, Debian's packages for this
+#      are installed.
+#
+# Says on stderr which compiler that is: sizes and instruction counts differ between compilers.
+# Exits with 69 and says what to install if none of them works.
+set -eu
+
+target=thumbv7em-none-eabihf
+previous=
+for argument in "$@"; do
+    case $previous in --target) target=$argument ;; esac
+    case $argument in --target=*) target=${argument#--target=} ;; esac
+    previous=$argument
+done
+export CARGO_BUILD_TARGET="$target"
+
+here=$(dirname "$0")
+version_min=1.95
+
+say() { echo "thumb-cargo: $*" >&2; }
+
+has_target() {
+    command -v rustc >/dev/null && command -v cargo >/dev/null &&
+        ls "$(rustc --print sysroot)/lib/rustlib/$target/lib/"libcore-*.rlib >/dev/null 2>&1
+}
+
+add_target() {
+    command -v rustup >/dev/null || return 1
+    say "rustup target add $target"
+    timeout 120 rustup target add "$target" >&2 && has_target
+}
+
+# Whether the system's Rust is there, new enough, and can build core for another target.
+has_system_rust() {
+    [ -x /usr/bin/cargo ] && [ -x /usr/bin/rustc ] && command -v ld.lld >/dev/null || return 1
+    [ -f "$(system rustc --print sysroot)/lib/rustlib/src/rust/library/core/Cargo.toml" ] || return 1
+    version=$(system rustc --version | cut -d ' ' -f 2)
+    [ "$(printf '%s\n' "$version_min" "$version" | sort -V | head -n 1)" = "$version_min" ]
+}
+
+# A program of the system's Rust, free of what rustup and an outer cargo have set for theirs.
+system() {
+    program=$1
+    shift
+    env -u RUSTUP_TOOLCHAIN -u RUSTC_WRAPPER -u RUSTDOC -u CARGO -u LD_LIBRARY_PATH \
+        RUSTC_BOOTSTRAP=1 RUSTC=/usr/bin/rustc "/usr/bin/$program" "$@"
+}
+
+system_packages='rustc-web cargo-web rust-web-src lld'
+
+provide_system_rust() {
+    [ "${PROVIDE_TOOLS:-}" = 1 ] || return 1
+    # shellcheck disable=SC2086 # a list of names
+    "$here/apt-install.sh" $system_packages && has_system_rust
+}
+
+named() { say "compiler: $1, target $target"; }
+
+if has_target || add_target; then
+    named "$(rustc --version)"
+    [ "${1:-}" = --compiler ] || exec cargo "$@"
+elif has_system_rust || provide_system_rust; then
+    named "$(system rustc --version), core built from its source"
+    [ "${1:-}" = --compiler ] || system cargo -Z build-std=core \
+        --config "target.$target.linker='ld.lld'" \
+        --config "target.$target.rustflags=['-Clinker-flavor=ld.lld']" \
+        "$@"
+else
+    say "no core library for $target. Either of these provides it:"
+    say "    rustup target add $target"
+    say "    apt-get install --no-install-recommends $system_packages   (Rust $version_min or newer)"
+    exit 69
+fi

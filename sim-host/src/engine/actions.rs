@@ -1,0 +1,76 @@
+//! Actions by table: the action network is a function of a window, shared by all robots and
+//! repetitions of a genome.
+
+use super::path::Path;
+use super::robot_word::{ACTION, HEADING_SHIFT};
+use super::window::{WINDOWS, WindowOrder};
+use minimal_surprise_controller::{Action, Controller, Turn};
+
+/// What to do, as the top byte of what is added to a robot word: bit 7 the action, bits 5 and 6
+/// the turn (0, 1 or 3 quarters), and bit 0 set while nobody has asked.
+type Entry = u8;
+
+const NOT_ASKED: Entry = 1;
+
+/// Bits that an entry is shifted by when it is added to a robot word.
+pub(super) const ENTRY_SHIFT: u32 = 24;
+/// A quarter turn to the left.
+pub(super) const TURN_LEFT: Entry = to_entry(Action::Turn, Turn::CounterClockwise);
+/// A quarter turn to the right.
+pub(super) const TURN_RIGHT: Entry = to_entry(Action::Turn, Turn::Clockwise);
+/// Going straight.
+pub(super) const STRAIGHT: Entry = to_entry(Action::Straight, Turn::Clockwise);
+
+const fn to_entry(action: Action, turn: Turn) -> Entry {
+    let quarters: u32 = match turn {
+        Turn::CounterClockwise => 1,
+        Turn::Clockwise => 3,
+    };
+    match action {
+        Action::Straight => 0,
+        Action::Turn => ((ACTION | quarters << HEADING_SHIFT) >> ENTRY_SHIFT) as Entry,
+    }
+}
+
+/// The answers of one action network, worked out when first asked for, or all at once.
+#[derive(Clone, Debug)]
+pub(super) struct ActionTable {
+    /// An entry a window, and three bytes so that each can be read as part of a word.
+    entries: Vec<Entry>,
+}
+
+impl ActionTable {
+    pub(super) fn new() -> Self {
+        Self {
+            entries: vec![NOT_ASKED; WINDOWS + 3],
+        }
+    }
+
+    /// Forgets the last genome. Where the path has the means, all entries are worked out at once;
+    /// elsewhere few enough are ever asked for.
+    pub(super) fn prepare(&mut self, path: Path, controller: &Controller, order: &WindowOrder) {
+        match path {
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx512(cpu) => cpu.fill_action_table(controller, order, &mut self.entries),
+            _ => self.entries.fill(NOT_ASKED),
+        }
+    }
+
+    /// All entries, and three bytes more.
+    #[cfg(target_arch = "x86_64")]
+    pub(super) fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// The entry of a window, by asking the controller if need be.
+    #[inline]
+    pub(super) fn get(&mut self, window: u16, order: &WindowOrder, controller: &Controller) -> u32 {
+        let entry = &mut self.entries[usize::from(window)];
+        if *entry == NOT_ASKED {
+            let (reading, last_action) = order.reading(window);
+            let (action, turn) = controller.decide(reading, last_action);
+            *entry = to_entry(action, turn);
+        }
+        u32::from(*entry) << ENTRY_SHIFT
+    }
+}

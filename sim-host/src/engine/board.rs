@@ -1,0 +1,187 @@
+//! Occupancy as rows of bits, once along x and once along y, so that a robot of any heading finds
+//! its window in three neighbouring lines.
+//!
+//! Facing east or north, a window is read as it lies: `rows` has the lines y = 0, 1, … with x
+//! growing along them; `columns` has the lines x = W − 1, W − 2, … with y growing along them, so
+//! that in both the line before is on the robot's right. Facing west or south the window is the
+//! same cells half a turn on: its 15 bits in reverse order.
+
+use super::robot_word;
+use crate::torus::Grid;
+
+/// Lines of bits with a border that repeats what lies across the edges: two bits at either end of
+/// a line, one line before the first and after the last.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Plane {
+    /// Cells along a line.
+    side: u32,
+    lines: u32,
+    words_per_line: usize,
+    /// One word more than the lines have: any five bits may be read from two words.
+    bits: Vec<u32>,
+}
+
+/// Width of the border at either end of a line.
+const BORDER: u32 = 2;
+
+impl Plane {
+    /// Longest lines that take one word.
+    pub(super) const SIDE_MAX_ONE_WORD: u32 = 32 - 2 * BORDER;
+
+    fn reset(&mut self, side: u32, lines: u32) {
+        self.side = side;
+        self.lines = lines;
+        self.words_per_line = (side + 2 * BORDER).div_ceil(32) as usize;
+        self.bits.clear();
+        self.bits
+            .resize((lines as usize + 2) * self.words_per_line + 1, 0);
+    }
+
+    /// Line −1 first, each of [`Plane::words_per_line`] words, and one word more.
+    pub(super) fn words(&self) -> &[u32] {
+        &self.bits
+    }
+
+    pub(super) fn words_per_line(&self) -> usize {
+        self.words_per_line
+    }
+
+    pub(super) fn side(&self) -> u32 {
+        self.side
+    }
+
+    pub(super) fn lines(&self) -> u32 {
+        self.lines
+    }
+
+    #[inline]
+    fn place(&self, line: u32, along: u32) -> (usize, u32) {
+        let bit = along + BORDER;
+        let word = (line as usize + 1) * self.words_per_line + (bit / 32) as usize;
+        (word, 1 << (bit % 32))
+    }
+
+    #[inline]
+    fn flip(&mut self, line: u32, along: u32) {
+        let (word, mask) = self.place(line, along);
+        self.bits[word] ^= mask;
+    }
+
+    #[inline]
+    fn occupied(&self, line: u32, along: u32) -> bool {
+        let (word, mask) = self.place(line, along);
+        self.bits[word] & mask != 0
+    }
+
+    /// Cells `along` − 2 to `along` + 2 of the lines before, at and after `line`, five bits each.
+    #[inline]
+    fn window(&self, line: u32, along: u32) -> u16 {
+        let mut window = 0;
+        let first = line as usize * self.words_per_line + (along / 32) as usize;
+        for row in 0..3 {
+            let word = first + row * self.words_per_line;
+            let pair = u64::from(self.bits[word]) | u64::from(self.bits[word + 1]) << 32;
+            window |= ((pair >> (along % 32)) as u16 & 31) << (5 * row);
+        }
+        window
+    }
+
+    /// Copies to the border what lies across the edges.
+    fn close_edges(&mut self) {
+        let words_per_line = self.words_per_line;
+        let lines = self.lines as usize;
+        let (end_word, end_bit) = ((self.side / 32) as usize, self.side % 32);
+        for line in self.bits[words_per_line..]
+            .chunks_exact_mut(words_per_line)
+            .take(lines)
+        {
+            // Bits `side` and `side + 1` are the last two cells, bits 2 and 3 the first two.
+            let pair = u64::from(line[end_word])
+                | u64::from(line.get(end_word + 1).copied().unwrap_or(0)) << 32;
+            line[0] = line[0] & !3 | (pair >> end_bit) as u32 & 3;
+            let first = line[0] >> BORDER & 3;
+            for cell in 0..2 {
+                let bit = self.side + BORDER + cell;
+                let word = &mut line[(bit / 32) as usize];
+                *word = *word & !(1 << (bit % 32)) | (first >> cell & 1) << (bit % 32);
+            }
+        }
+        self.bits
+            .copy_within(lines * words_per_line..(lines + 1) * words_per_line, 0);
+        self.bits.copy_within(
+            words_per_line..2 * words_per_line,
+            (lines + 1) * words_per_line,
+        );
+    }
+}
+
+/// Both planes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Board {
+    width: u32,
+    height: u32,
+    pub(super) rows: Plane,
+    pub(super) columns: Plane,
+}
+
+impl Board {
+    /// Empties the board.
+    pub(super) fn reset(&mut self, grid: Grid) {
+        (self.width, self.height) = (grid.width().into(), grid.height().into());
+        self.rows.reset(self.width, self.height);
+        self.columns.reset(self.height, self.width);
+    }
+
+    /// Whether a line of either plane is a single word.
+    pub(super) fn is_narrow(&self) -> bool {
+        self.width.max(self.height) <= Plane::SIDE_MAX_ONE_WORD
+    }
+
+    /// Puts a robot on the cell or takes it away. Borders stay as they are.
+    #[inline]
+    pub(super) fn flip(&mut self, x: u32, y: u32) {
+        self.rows.flip(y, x);
+        self.columns.flip(self.width - 1 - x, y);
+    }
+
+    pub(super) fn close_edges(&mut self) {
+        self.rows.close_edges();
+        self.columns.close_edges();
+    }
+
+    /// The window of a robot, the bit of its own cell set. Borders must be up to date.
+    #[inline]
+    pub(super) fn window(&self, robot: u32) -> u16 {
+        let (x, y) = (robot_word::x(robot), robot_word::y(robot));
+        let heading = robot_word::heading(robot);
+        let window = if heading & 1 == 0 {
+            self.rows.window(y, x)
+        } else {
+            self.columns.window(self.width - 1 - x, y)
+        };
+        if heading & 2 == 0 {
+            window
+        } else {
+            window.reverse_bits() >> 1
+        }
+    }
+
+    /// Moves a robot one cell ahead unless the cell is taken. Borders stay as they are.
+    #[inline]
+    pub(super) fn advance(&mut self, robot: &mut u32) {
+        let (x, y) = (robot_word::x(*robot), robot_word::y(*robot));
+        let up = |from: u32, side: u32| if from + 1 == side { 0 } else { from + 1 };
+        let down = |from: u32, side: u32| if from == 0 { side - 1 } else { from - 1 };
+        let (to_x, to_y) = match robot_word::heading(*robot) {
+            0 => (up(x, self.width), y),
+            1 => (x, up(y, self.height)),
+            2 => (down(x, self.width), y),
+            _ => (x, down(y, self.height)),
+        };
+        if !self.rows.occupied(to_y, to_x) {
+            self.flip(x, y);
+            self.flip(to_x, to_y);
+            *robot = *robot & !robot_word::POSITION | robot_word::position(to_x, to_y);
+        }
+    }
+}

@@ -1,0 +1,327 @@
+//! Evaluations by a chosen engine.
+
+use super::actions::ActionTable;
+use super::every_step::Groups;
+use super::fixed_predictions;
+use super::flips::{Drawer, FlipSource};
+use super::lanes::{BLOCK_STEPS, Predictor};
+use super::network::PredictionWeights;
+use super::path::Path;
+use super::recording::{Recorder, Recording};
+use super::skipping;
+use super::swarm::{Behaviour, Swarm};
+use super::window::WindowOrder;
+use crate::evaluation::{self, Evaluation};
+use crate::scenario::{Scenario, Trial};
+use crate::world::check_poses;
+use minimal_surprise_controller::{Controller, Genome, SensorModel};
+use std::sync::OnceLock;
+
+/// Longest recording that is kept as a whole, in words of four robot-steps: 8 MB.
+const RECORDING_WORDS_MAX: usize = 1 << 20;
+/// Recordings worked off part by part have about this many words: they stay in the cache.
+const PART_WORDS: usize = 1 << 15;
+/// But no part is shorter than this, or prediction states would go in and out of the cache more
+/// often than it is worth.
+const PART_BLOCKS_MIN: usize = 4;
+/// Robots of small swarms that are worked off together.
+const ROBOTS_TOGETHER: usize = 1 << 12;
+/// Most flips kept for a trial: 8 MB.
+const FLIPS_MAX: usize = 1 << 22;
+
+/// Which program evaluates. All give the same results.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Engine {
+    /// The straight one: [`evaluation::evaluate`].
+    Plain,
+    /// This module.
+    #[default]
+    Fast,
+}
+
+/// The trials of a generation, and what the fast engine prepares for all of its genomes at once.
+/// May be shared between threads.
+#[derive(Debug)]
+pub struct TrialSet {
+    scenario: Scenario,
+    trials: Vec<Trial>,
+    order: WindowOrder,
+    flips: Vec<OnceLock<Vec<u16>>>,
+}
+
+impl TrialSet {
+    /// Trials for genomes of the given sensor model.
+    ///
+    /// # Panics
+    /// If there is no trial, or a trial's poses are not as many as the scenario has robots or do not fit its grid.
+    #[must_use]
+    pub fn new(scenario: Scenario, model: SensorModel, trials: Vec<Trial>) -> Self {
+        assert!(!trials.is_empty(), "there is at least one trial");
+        for trial in &trials {
+            assert_eq!(trial.starts.len(), scenario.robots() as usize);
+            check_poses(scenario.grid(), &trial.starts)
+                .expect("trials are drawn on the scenario's grid");
+        }
+        Self {
+            scenario,
+            order: WindowOrder::new(model),
+            flips: trials.iter().map(|_| OnceLock::new()).collect(),
+            trials,
+        }
+    }
+
+    /// The scenario.
+    #[must_use]
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// The trials.
+    #[must_use]
+    pub fn trials(&self) -> &[Trial] {
+        &self.trials
+    }
+
+    fn robots(&self) -> usize {
+        self.scenario.robots() as usize
+    }
+
+    fn steps(&self) -> usize {
+        self.scenario.steps() as usize
+    }
+
+    fn flips(&self, repetition: usize) -> FlipSource<'_> {
+        let noise = &self.trials[repetition].noise;
+        if noise.rate().is_none() {
+            return FlipSource::None;
+        }
+        let drawer = Drawer::new(noise, &self.order);
+        if self.robots() * self.steps() > FLIPS_MAX {
+            return FlipSource::Drawn(Box::new(drawer));
+        }
+        FlipSource::Known(
+            self.flips[repetition].get_or_init(|| drawer.draw_all(self.steps(), self.robots())),
+        )
+    }
+}
+
+/// Evaluates genomes; holds what is used again from one to the next. One a thread.
+pub struct Evaluator {
+    engine: Engine,
+    skips_repeats: bool,
+    actions: ActionTable,
+    recorder: Recorder,
+    recording: Recording,
+    swarms: Vec<Swarm>,
+    groups: Groups,
+    matches: Vec<u64>,
+}
+
+impl Evaluator {
+    /// An evaluator that runs on the given path; the plain engine has none and ignores it.
+    #[must_use]
+    pub fn new(engine: Engine, path: Path) -> Self {
+        Self {
+            engine,
+            skips_repeats: true,
+            actions: ActionTable::new(),
+            recorder: Recorder::new(path),
+            recording: Recording::default(),
+            swarms: Vec::new(),
+            groups: Groups::default(),
+            matches: Vec::new(),
+        }
+    }
+
+    /// Whether to go on by counting once a world, or a robot in it, repeats itself. On unless
+    /// turned off, which changes no result.
+    #[must_use]
+    pub fn with_repeats_skipped(mut self, skips: bool) -> Self {
+        self.skips_repeats = skips;
+        self
+    }
+
+    /// A genome's fitness over all trials: what [`evaluation::evaluate`] gives.
+    ///
+    /// # Panics
+    /// If the trials are for another sensor model.
+    pub fn evaluate(&mut self, genome: &Genome, trials: &TrialSet) -> Evaluation {
+        if self.engine == Engine::Plain {
+            return evaluation::evaluate(genome, &trials.scenario, &trials.trials);
+        }
+        self.count_matches(genome, trials);
+        let (worst_repetition, &matches) = (0..)
+            .zip(&self.matches)
+            .min_by_key(|&(_, matches)| matches)
+            .expect("there is at least one trial");
+        Evaluation {
+            matches,
+            worst_repetition,
+        }
+    }
+
+    fn count_matches(&mut self, genome: &Genome, trials: &TrialSet) {
+        let order = &trials.order;
+        assert_eq!(
+            genome.topology().model(),
+            order.model(),
+            "trials are for the genome's sensor model"
+        );
+        let controller = Controller::new(genome);
+        let predictor = PredictionWeights::new(&controller, order)
+            .map(|weights| Predictor::new(self.recorder.path, &weights, order.sensors()));
+        self.actions.prepare(self.recorder.path, &controller, order);
+        self.matches.clear();
+        self.matches.resize(trials.trials.len(), 0);
+
+        let blocks = trials.steps().div_ceil(BLOCK_STEPS);
+        let noisy = trials.trials.iter().any(|t| !t.noise.rate().is_none());
+        let words = blocks * trials.robots();
+        let mut run = Run {
+            evaluator: self,
+            controller: &controller,
+            predictor: predictor.as_ref(),
+            expected_empty: order.sensors() & !order.window(genome.topology().fixed().bits()),
+            trials,
+        };
+        if run.evaluator.skips_repeats && !noisy && words <= RECORDING_WORDS_MAX {
+            run.whole(RECORDING_WORDS_MAX / words);
+        } else {
+            run.in_parts((ROBOTS_TOGETHER / trials.robots()).max(1));
+        }
+    }
+}
+
+/// One genome's evaluation.
+struct Run<'a> {
+    evaluator: &'a mut Evaluator,
+    controller: &'a Controller,
+    predictor: Option<&'a Predictor>,
+    /// Window bits that robots predict not occupied before their first step.
+    expected_empty: u16,
+    trials: &'a TrialSet,
+}
+
+impl Run<'_> {
+    /// Records a few repetitions as a whole, then counts their matches.
+    fn whole(&mut self, repetitions_at_once: usize) {
+        let (robots, steps) = (self.trials.robots(), self.trials.steps());
+        let Evaluator {
+            actions,
+            recorder,
+            recording,
+            swarms,
+            matches,
+            ..
+        } = &mut *self.evaluator;
+        let order = &self.trials.order;
+        let mut behaviour = Behaviour {
+            controller: self.controller,
+            order,
+            actions,
+        };
+        swarms.resize_with(swarms.len().max(1), Swarm::default);
+        for (trials, matches) in self
+            .trials
+            .trials
+            .chunks(repetitions_at_once)
+            .zip(matches.chunks_mut(repetitions_at_once))
+        {
+            recording.reset(trials.len() * robots, steps.div_ceil(BLOCK_STEPS));
+            for (place, trial) in trials.iter().enumerate() {
+                swarms[0].reset(self.trials.scenario.grid(), &trial.starts);
+                recorder.record_until_it_repeats(
+                    &mut swarms[0],
+                    &mut behaviour,
+                    steps,
+                    recording,
+                    place * robots,
+                );
+            }
+            let add = |robot: usize, matched| matches[robot / robots] += matched;
+            let expected_empty = self.expected_empty;
+            match self.predictor {
+                Some(predictor) => {
+                    skipping::count_matches(predictor, recording, steps, expected_empty, add);
+                }
+                None => {
+                    let sensors = order.sensors();
+                    fixed_predictions::count_matches(
+                        recording,
+                        steps,
+                        expected_empty,
+                        sensors,
+                        add,
+                    );
+                }
+            }
+        }
+    }
+
+    /// Records and counts some steps of a few repetitions at a time.
+    fn in_parts(&mut self, repetitions_at_once: usize) {
+        let (robots, steps) = (self.trials.robots(), self.trials.steps());
+        let Evaluator {
+            actions,
+            recorder,
+            recording,
+            swarms,
+            matches,
+            groups,
+            ..
+        } = &mut *self.evaluator;
+        let order = &self.trials.order;
+        let mut behaviour = Behaviour {
+            controller: self.controller,
+            order,
+            actions,
+        };
+        let repetitions: Vec<usize> = (0..self.trials.trials.len()).collect();
+        for (repetitions, matches) in repetitions
+            .chunks(repetitions_at_once)
+            .zip(matches.chunks_mut(repetitions_at_once))
+        {
+            let together = repetitions.len() * robots;
+            let part_blocks = (PART_WORDS / together).max(PART_BLOCKS_MIN);
+            let part_steps = part_blocks * BLOCK_STEPS;
+            swarms.resize_with(repetitions.len(), Swarm::default);
+            let mut flips = Vec::with_capacity(repetitions.len());
+            for (swarm, &repetition) in swarms.iter_mut().zip(repetitions) {
+                let trial = &self.trials.trials[repetition];
+                swarm.reset(self.trials.scenario.grid(), &trial.starts);
+                flips.push(self.trials.flips(repetition));
+            }
+            groups.reset(together, self.expected_empty);
+            for start in (0..steps).step_by(part_steps) {
+                let part = start..steps.min(start + part_steps);
+                recording.reset(together, part.len().div_ceil(BLOCK_STEPS));
+                for (place, (swarm, flips)) in swarms.iter_mut().zip(&mut flips).enumerate() {
+                    recorder.record_steps(
+                        swarm,
+                        &mut behaviour,
+                        flips,
+                        part.clone(),
+                        recording,
+                        place * robots,
+                    );
+                }
+                match self.predictor {
+                    Some(predictor) => groups.advance(predictor, recording, part.len()),
+                    None => fixed_predictions::count_matches(
+                        recording,
+                        part.len(),
+                        self.expected_empty,
+                        order.sensors(),
+                        |robot, matched| matches[robot / robots] += matched,
+                    ),
+                }
+            }
+            if self.predictor.is_some() {
+                let matched = groups.matched().chunks(robots);
+                for (total, matched) in matches.iter_mut().zip(matched) {
+                    *total += matched.iter().sum::<u64>();
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Lanes: the prediction networks of 32 robots, worked out side by side, four steps at a time.
+//!
+//! A robot's inputs of four steps are one 64-bit word, a *block*. Which robot is in which lane, and
+//! at which time, is the caller's business: lanes know nothing of each other.
+
+use super::network::PredictionWeights;
+use super::path::Path;
+use super::portable;
+#[cfg(target_arch = "x86_64")]
+use super::x86;
+use minimal_surprise_controller::network::MAX_HIDDEN;
+
+/// Robots side by side.
+pub(super) const LANES: usize = 32;
+/// Steps of a block.
+pub(super) const BLOCK_STEPS: usize = 4;
+/// Pairs of hidden neurons: factors come in pairs, because that is how vector units multiply.
+pub(super) const PAIRS: usize = MAX_HIDDEN / 2;
+
+/// What 32 robots remember from step to step.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(super) struct Lanes {
+    /// Hidden activations 2p (low half) and 2p + 1 (high half) of pair p, lane by lane.
+    pub(super) hidden: [[u32; LANES]; PAIRS],
+    /// Window bits that are predicted *not* occupied. A bit matches where this differs from the
+    /// next reading.
+    pub(super) expected_empty: [u16; LANES],
+}
+
+/// How many bits matched in a block.
+#[derive(Clone, Debug, Default)]
+#[repr(align(64))]
+pub(super) struct Matches {
+    /// In all four steps, lane by lane.
+    pub(super) block: [u16; LANES],
+    /// In the first few; zero if that is no step.
+    pub(super) first_steps: [u16; LANES],
+}
+
+impl Lanes {
+    /// Robots before their first step.
+    pub(super) fn at_start(expected_empty: u16) -> Self {
+        Self {
+            hidden: [[0; LANES]; PAIRS],
+            expected_empty: [expected_empty; LANES],
+        }
+    }
+
+    /// Puts a robot before its first step into a lane.
+    pub(super) fn restart(&mut self, lane: usize, expected_empty: u16) {
+        for pair in &mut self.hidden {
+            pair[lane] = 0;
+        }
+        self.expected_empty[lane] = expected_empty;
+    }
+}
+
+/// A genome's prediction network, laid out for a path.
+pub(super) enum Predictor {
+    Portable(Box<portable::Network>),
+    #[cfg(target_arch = "x86_64")]
+    Avx2(x86::Avx2, Box<x86::avx2::Network>),
+    #[cfg(target_arch = "x86_64")]
+    Avx512(x86::Avx512, Box<x86::avx512::Network>),
+}
+
+impl Predictor {
+    pub(super) fn new(path: Path, weights: &PredictionWeights, sensors: u16) -> Self {
+        match path {
+            Path::Portable => Self::Portable(Box::new(portable::Network::new(weights, sensors))),
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx2(cpu) => Self::Avx2(cpu, Box::new(x86::avx2::Network::new(weights, sensors))),
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx512(cpu) => {
+                Self::Avx512(cpu, Box::new(x86::avx512::Network::new(weights, sensors)))
+            }
+        }
+    }
+
+    /// Four steps of all lanes. The first `first_steps` of them (0 to 3) are also counted by
+    /// themselves. Returns a bit for every lane whose hidden activations are what they were before.
+    #[inline]
+    pub(super) fn run_block(
+        &self,
+        lanes: &mut Lanes,
+        blocks: &[u64; LANES],
+        first_steps: usize,
+        matches: &mut Matches,
+    ) -> u32 {
+        match self {
+            Self::Portable(network) => network.run_block(lanes, blocks, first_steps, matches),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(cpu, network) => cpu.run_block(network, lanes, blocks, first_steps, matches),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(cpu, network) => {
+                cpu.run_block(network, lanes, blocks, first_steps, matches)
+            }
+        }
+    }
+}

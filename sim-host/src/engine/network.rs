@@ -1,0 +1,96 @@
+//! The prediction network in window order, ready to be laid out for a vector unit.
+//!
+//! An input neuron has two values, so the sum that a hidden neuron makes of its inputs is a
+//! constant and one addend for each bit that is set; sums are exact, whatever the order.
+
+use super::window::{WINDOW_BITS, WindowOrder};
+use minimal_surprise_controller::Controller;
+use minimal_surprise_controller::controller::spread;
+use minimal_surprise_controller::fixed::ROUNDING_Q24;
+use minimal_surprise_controller::network::{MAX_HIDDEN, MAX_OUTPUTS, Network, SELF_LOOP};
+
+/// What a hidden neuron makes of a window, Q24.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct HiddenSum {
+    /// The sum for an empty window, the rounding term included.
+    pub(super) empty: i32,
+    /// What each bit of the window adds to it.
+    pub(super) addends: [i32; WINDOW_BITS],
+}
+
+impl HiddenSum {
+    /// The hidden neurons of a network.
+    pub(super) fn of<const H: usize, const O: usize>(
+        network: &Network<H, O>,
+        order: &WindowOrder,
+    ) -> [Self; H] {
+        let mut sums = [Self::default(); H];
+        for (sum, row) in sums.iter_mut().zip(network.hidden_rows()) {
+            sum.empty = ROUNDING_Q24;
+            let inputs = order.inputs().zip(network.input_levels()).zip(row);
+            for ((bit, [low, high]), &weight) in inputs {
+                let weight = i32::from(weight);
+                sum.empty += weight * i32::from(*low);
+                sum.addends[bit] = weight * (i32::from(*high) - i32::from(*low));
+            }
+        }
+        sums
+    }
+
+    /// What the bits from `first` on add to the sum, for each of their 2ⁿ = `N` values. The sum of
+    /// an empty window is part of the first table.
+    ///
+    /// A table alone need not fit `i32`; its values and the totals are right modulo 2³², and the
+    /// sums themselves fit.
+    pub(super) fn table<const N: usize>(&self, first: usize) -> [i32; N] {
+        let mut table = [0; N];
+        table[0] = if first == 0 { self.empty } else { 0 };
+        for (bit, addend) in self.addends[first..]
+            .iter()
+            .enumerate()
+            .take(N.trailing_zeros() as usize)
+        {
+            for value in 0..1 << bit {
+                table[value | 1 << bit] = i32::wrapping_add(table[value], *addend);
+            }
+        }
+        table
+    }
+}
+
+/// The network of one genome.
+#[derive(Clone, Debug)]
+pub(super) struct PredictionWeights {
+    /// Hidden neurons in use.
+    pub(super) hidden: usize,
+    pub(super) sums: [HiddenSum; MAX_HIDDEN],
+    pub(super) self_loops: [i16; MAX_HIDDEN],
+    /// Output rows, with the window bit that each predicts; the highest bit first.
+    pub(super) outputs: Vec<(u32, [i16; MAX_HIDDEN])>,
+}
+
+impl PredictionWeights {
+    /// `None` if all predictions are fixed.
+    pub(super) fn new(controller: &Controller, order: &WindowOrder) -> Option<Self> {
+        let network = controller.prediction_network()?;
+        let predicted = controller.topology().predicted().bits();
+        let mut outputs: Vec<(u32, [i16; MAX_HIDDEN])> = network
+            .output_rows()
+            .iter()
+            .take(network.shape().outputs())
+            .enumerate()
+            .map(|(output, &row)| {
+                let sensor = spread(1 << output, predicted);
+                (order.window(sensor).trailing_zeros(), row)
+            })
+            .collect();
+        outputs.sort_unstable_by_key(|&(bit, _)| core::cmp::Reverse(bit));
+        debug_assert!(outputs.len() <= MAX_OUTPUTS);
+        Some(Self {
+            hidden: network.shape().hidden(),
+            sums: HiddenSum::of(network, order),
+            self_loops: network.hidden_rows().map(|row| row[SELF_LOOP]),
+            outputs,
+        })
+    }
+}

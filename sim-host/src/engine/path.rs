@@ -1,0 +1,86 @@
+//! Code paths: the same results by the instructions of different processors.
+
+#[cfg(target_arch = "x86_64")]
+use super::x86;
+
+/// Environment variable that forces a path: `portable`, `avx2` or `avx512`.
+pub const PATH_VARIABLE: &str = "MINIMAL_SURPRISE_PATH";
+
+/// The instructions that the fast engine uses. All give the same results.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Path {
+    /// What every processor has.
+    Portable,
+    /// AVX2: predictions of 16 robots at once.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(x86::Avx2),
+    /// AVX-512 with its additions up to Ice Lake and Zen 4: predictions of 32 robots at once,
+    /// sensing and deciding of 16.
+    #[cfg(target_arch = "x86_64")]
+    Avx512(x86::Avx512),
+}
+
+/// This processor cannot run the path, or there is none of this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{PATH_VARIABLE} names the path {0:?}; this processor has {list}", list = Path::names())]
+pub struct PathError(String);
+
+impl Path {
+    /// The paths that this processor can run, the best one last.
+    #[must_use]
+    pub fn available() -> Vec<Self> {
+        #[allow(unused_mut, reason = "there is nothing to add on other processors")]
+        let mut paths = vec![Self::Portable];
+        #[cfg(target_arch = "x86_64")]
+        {
+            paths.extend(x86::Avx2::detect().map(Self::Avx2));
+            paths.extend(x86::Avx512::detect().map(Self::Avx512));
+        }
+        paths
+    }
+
+    /// The fastest path that this processor can run.
+    #[must_use]
+    pub fn best() -> Self {
+        Self::available().pop().unwrap_or(Self::Portable)
+    }
+
+    /// The path of a name.
+    ///
+    /// # Errors
+    /// [`PathError`] if this processor has no path of the name.
+    pub fn named(name: &str) -> Result<Self, PathError> {
+        Self::available()
+            .into_iter()
+            .find(|path| path.name() == name)
+            .ok_or_else(|| PathError(name.to_owned()))
+    }
+
+    /// The path that [`PATH_VARIABLE`] names, else the best.
+    ///
+    /// # Errors
+    /// [`PathError`] if the variable names a path that this processor does not have.
+    pub fn from_environment() -> Result<Self, PathError> {
+        match std::env::var(PATH_VARIABLE) {
+            Ok(name) if !name.is_empty() => Self::named(&name),
+            _ => Ok(Self::best()),
+        }
+    }
+
+    /// `portable`, `avx2` or `avx512`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => "avx512",
+        }
+    }
+
+    fn names() -> String {
+        let names: Vec<&str> = Self::available().into_iter().map(Self::name).collect();
+        names.join(", ")
+    }
+}

@@ -1,0 +1,147 @@
+//! Recordings: what the robots' prediction networks see, written down by the world as it runs.
+//!
+//! A robot's inputs lie together, a block of four steps a word, so that predictions can be worked
+//! out robot by robot, each at its own pace.
+
+use super::flips::FlipSource;
+use super::lanes::BLOCK_STEPS;
+use super::path::Path;
+use super::repeats::History;
+use super::swarm::{Behaviour, ROBOTS_AT_ONCE, Swarm};
+
+/// The inputs of a number of robots over a number of blocks.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Recording {
+    blocks: usize,
+    words: Vec<u64>,
+}
+
+impl Recording {
+    pub(super) fn reset(&mut self, robots: usize, blocks: usize) {
+        self.blocks = blocks;
+        self.words.resize(robots * blocks, 0);
+    }
+
+    pub(super) fn robots(&self) -> usize {
+        self.words.len() / self.blocks
+    }
+
+    pub(super) fn blocks(&self) -> usize {
+        self.blocks
+    }
+
+    /// The blocks of one robot.
+    #[inline]
+    pub(super) fn of_robot(&self, robot: usize) -> &[u64] {
+        &self.words[robot * self.blocks..][..self.blocks]
+    }
+
+    /// The same for some robots in a row.
+    fn of_robots(&mut self, first: usize, robots: usize) -> &mut [u64] {
+        &mut self.words[first * self.blocks..][..robots * self.blocks]
+    }
+}
+
+/// Runs worlds and writes recordings.
+pub(super) struct Recorder {
+    pub(super) path: Path,
+    rows: [Vec<u16>; BLOCK_STEPS],
+    history: History,
+}
+
+impl Recorder {
+    pub(super) fn new(path: Path) -> Self {
+        Self {
+            path,
+            rows: Default::default(),
+            history: History::default(),
+        }
+    }
+
+    /// Runs a swarm from its start for `steps` and records it, its first robot being `first`.
+    ///
+    /// The world stops as soon as it repeats itself; what follows is copied.
+    pub(super) fn record_until_it_repeats(
+        &mut self,
+        swarm: &mut Swarm,
+        behaviour: &mut Behaviour<'_>,
+        steps: usize,
+        recording: &mut Recording,
+        first: usize,
+    ) {
+        let robots = swarm.state().len();
+        let blocks = recording.blocks();
+        self.history.clear();
+        for block in 0..blocks {
+            if let Some(earlier) = self.history.find_or_add(swarm.state()) {
+                let period = block - earlier;
+                for words in recording.of_robots(first, robots).chunks_exact_mut(blocks) {
+                    for block in block..blocks {
+                        words[block] = words[block - period];
+                    }
+                }
+                return;
+            }
+            let in_block = BLOCK_STEPS.min(steps - block * BLOCK_STEPS);
+            let flips = &mut FlipSource::None;
+            self.record_block(
+                swarm,
+                behaviour,
+                flips,
+                block * BLOCK_STEPS..block * BLOCK_STEPS + in_block,
+                &mut recording.of_robots(first, robots)[block..],
+                blocks,
+            );
+        }
+    }
+
+    /// Runs a swarm for the given steps and records them from block 0 on.
+    pub(super) fn record_steps(
+        &mut self,
+        swarm: &mut Swarm,
+        behaviour: &mut Behaviour<'_>,
+        flips: &mut FlipSource<'_>,
+        steps: core::ops::Range<usize>,
+        recording: &mut Recording,
+        first: usize,
+    ) {
+        let robots = swarm.state().len();
+        let blocks = recording.blocks();
+        for (block, start) in steps.clone().step_by(BLOCK_STEPS).enumerate() {
+            self.record_block(
+                swarm,
+                behaviour,
+                flips,
+                start..steps.end.min(start + BLOCK_STEPS),
+                &mut recording.of_robots(first, robots)[block..],
+                blocks,
+            );
+        }
+    }
+
+    /// One block of all robots; `words[0]` is the first robot's, and the others' follow `stride`
+    /// apart.
+    fn record_block(
+        &mut self,
+        swarm: &mut Swarm,
+        behaviour: &mut Behaviour<'_>,
+        flips: &mut FlipSource<'_>,
+        steps: core::ops::Range<usize>,
+        words: &mut [u64],
+        stride: usize,
+    ) {
+        let robots = swarm.state().len();
+        for (row, step) in self.rows.iter_mut().zip(steps) {
+            row.resize(robots.next_multiple_of(ROBOTS_AT_ONCE), 0);
+            swarm.step(self.path, behaviour, flips.row(step, robots), row);
+        }
+        for row in &mut self.rows {
+            row.resize(robots.next_multiple_of(ROBOTS_AT_ONCE), 0);
+        }
+        let [a, b, c, d] = &self.rows;
+        let inputs = a.iter().zip(b).zip(c).zip(d);
+        for (word, (((&a, &b), &c), &d)) in words.iter_mut().step_by(stride).zip(inputs) {
+            *word = u64::from(a) | u64::from(b) << 16 | u64::from(c) << 32 | u64::from(d) << 48;
+        }
+    }
+}

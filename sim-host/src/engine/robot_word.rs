@@ -1,0 +1,48 @@
+//! A robot in one word: everything about it that the world depends on.
+//!
+//! ```text
+//! bits 0–13   x
+//! bits 14–27  y
+//! bit  28     zero
+//! bits 29–30  heading
+//! bit  31     last action, 1 = turn
+//! ```
+//!
+//! A turn is an addition at bit 29; what it carries out of bit 30 falls on the action, which is
+//! set anew in the same step. Two swarms are in the same state exactly if their words are equal.
+
+use crate::torus::Pose;
+
+const COORDINATE_BITS: u32 = 14;
+const COORDINATE: u32 = (1 << COORDINATE_BITS) - 1;
+/// Both coordinates.
+pub(super) const POSITION: u32 = (1 << (2 * COORDINATE_BITS)) - 1;
+/// Lowest bit of the heading: set where the robot faces north or south.
+pub(super) const HEADING_SHIFT: u32 = 29;
+/// The last action.
+pub(super) const ACTION: u32 = 1 << 31;
+
+const _: () = assert!(crate::torus::SIDE_MAX == 1 << COORDINATE_BITS);
+
+/// A robot that has not moved yet.
+pub(super) fn from_pose(pose: Pose) -> u32 {
+    position(pose.x.into(), pose.y.into()) | (pose.heading as u32) << HEADING_SHIFT
+}
+
+/// Coordinates in their places.
+pub(super) fn position(x: u32, y: u32) -> u32 {
+    x | y << COORDINATE_BITS
+}
+
+pub(super) fn x(word: u32) -> u32 {
+    word & COORDINATE
+}
+
+pub(super) fn y(word: u32) -> u32 {
+    word >> COORDINATE_BITS & COORDINATE
+}
+
+/// Number of the heading.
+pub(super) fn heading(word: u32) -> u32 {
+    word >> HEADING_SHIFT & 3
+}

@@ -1,0 +1,121 @@
+//! The world of one repetition: robots as words, the board as bits.
+//!
+//! The prediction network never acts back on the world, so a swarm runs on action tables alone
+//! and writes down each robot's inputs; predictions are worked out from these afterwards.
+
+use super::actions::ActionTable;
+use super::board::Board;
+use super::path::Path;
+use super::robot_word::{self, ACTION};
+use super::window::{ACTION_BIT, AHEAD_BIT, WindowOrder};
+#[cfg(target_arch = "x86_64")]
+use super::x86;
+use crate::torus::{Grid, Pose};
+use minimal_surprise_controller::Controller;
+
+/// Robot words come in multiples of this; the last ones may be of no robot.
+pub(super) const ROBOTS_AT_ONCE: usize = 16;
+
+/// What all swarms of an evaluation share: the genome's behaviour.
+pub(super) struct Behaviour<'a> {
+    pub(super) controller: &'a Controller,
+    pub(super) order: &'a WindowOrder,
+    pub(super) actions: &'a mut ActionTable,
+}
+
+/// A swarm on its torus.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Swarm {
+    robots: usize,
+    words: Vec<u32>,
+    board: Board,
+    /// Robots that go straight with nothing ahead of them, in index order.
+    movers: Vec<u32>,
+}
+
+impl Swarm {
+    /// Puts the robots at their starts.
+    pub(super) fn reset(&mut self, grid: Grid, starts: &[Pose]) {
+        self.robots = starts.len();
+        self.board.reset(grid);
+        self.words.clear();
+        self.words
+            .extend(starts.iter().map(|&pose| robot_word::from_pose(pose)));
+        for &word in &self.words {
+            self.board.flip(robot_word::x(word), robot_word::y(word));
+        }
+        let padded = self.robots.next_multiple_of(ROBOTS_AT_ONCE);
+        self.words.resize(padded, 0);
+        self.movers.clear();
+        self.movers.resize(padded + ROBOTS_AT_ONCE, 0);
+    }
+
+    /// Everything that the swarm's future depends on, noise aside.
+    pub(super) fn state(&self) -> &[u32] {
+        &self.words[..self.robots]
+    }
+
+    /// One step. `flips` are the robots' flipped bits in window order; `inputs` receives the
+    /// windows that their prediction networks see, the action just chosen in its place.
+    pub(super) fn step(
+        &mut self,
+        path: Path,
+        behaviour: &mut Behaviour<'_>,
+        flips: Option<&[u16]>,
+        inputs: &mut [u16],
+    ) {
+        let movers = match path {
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx512(cpu) => {
+                if !self.board.is_narrow() {
+                    self.board.close_edges();
+                }
+                cpu.sense_and_decide(x86::Sensing {
+                    board: &self.board,
+                    robots: self.robots,
+                    words: &mut self.words,
+                    entries: behaviour.actions.entries(),
+                    sensors: behaviour.order.sensors(),
+                    flips,
+                    inputs,
+                    movers: &mut self.movers,
+                })
+            }
+            _ => {
+                self.board.close_edges();
+                self.sense_and_decide(behaviour, flips, inputs)
+            }
+        };
+        for &robot in &self.movers[..movers] {
+            self.board.advance(&mut self.words[robot as usize]);
+        }
+    }
+
+    /// Turns those who turn and lists those who may move; the number of these is returned.
+    fn sense_and_decide(
+        &mut self,
+        behaviour: &mut Behaviour<'_>,
+        flips: Option<&[u16]>,
+        inputs: &mut [u16],
+    ) -> usize {
+        let sensors = behaviour.order.sensors();
+        let mut movers = 0;
+        for (robot, (word, input)) in self.words[..self.robots].iter_mut().zip(inputs).enumerate() {
+            let occupied = self.board.window(*word);
+            let reading = (occupied ^ flips.map_or(0, |flips| flips[robot])) & sensors;
+            let last_action = (*word >> ENTRY_TO_WINDOW) as u16 & ACTION_BIT;
+            let entry =
+                behaviour
+                    .actions
+                    .get(reading | last_action, behaviour.order, behaviour.controller);
+            *word = word.wrapping_add(entry) & !ACTION | entry & ACTION;
+            *input = reading | (entry >> ENTRY_TO_WINDOW) as u16 & ACTION_BIT;
+            self.movers[movers] = robot as u32;
+            movers += usize::from(entry & ACTION == 0 && occupied & AHEAD_BIT == 0);
+        }
+        movers
+    }
+}
+
+/// Shift that takes the action of a robot word to its place in the window.
+const ENTRY_TO_WINDOW: u32 = ACTION.trailing_zeros() - ACTION_BIT.trailing_zeros();

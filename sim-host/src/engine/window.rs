@@ -1,0 +1,104 @@
+//! The window: the three by five cells around a robot as one word, its rows along the heading.
+//!
+//! A robot senses by cutting its window out of rows of bits, so the engine works in window order
+//! throughout: action table, prediction network and score are rearranged once, and no reading is
+//! ever put into sensor order. Bit `5·(left + 1) + ahead + 2` is the cell (ahead, left). A robot's
+//! own cell, always occupied, leaves its place to the action value: with it, a window is the whole
+//! input of a network.
+
+use minimal_surprise_controller::sensor::{Cell, SensorModel};
+use minimal_surprise_controller::{Action, SensorBits};
+
+/// Cells of the window, bits of a network's input.
+pub(super) const WINDOW_BITS: usize = 15;
+/// Number of different windows.
+pub(super) const WINDOWS: usize = 1 << WINDOW_BITS;
+/// Cells of one row.
+pub(super) const ROW_BITS: usize = 5;
+/// The place of the own cell, and of the action value.
+pub(super) const ACTION_BIT: u16 = 1 << 7;
+/// The cell straight ahead.
+pub(super) const AHEAD_BIT: u16 = 1 << 8;
+
+/// Where the sensors of a model are in the window.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct WindowOrder {
+    model: SensorModel,
+    /// Window bits of each byte of a reading.
+    from_sensors: [[u16; 256]; 2],
+}
+
+/// The window bit of a cell.
+pub(super) fn bit_of(cell: Cell) -> usize {
+    (ROW_BITS as i32 * (i32::from(cell.left) + 1) + i32::from(cell.ahead) + 2) as usize
+}
+
+impl WindowOrder {
+    pub(super) fn new(model: SensorModel) -> Self {
+        let mut from_sensors = [[0; 256]; 2];
+        for (sensor, &cell) in model.cells().iter().enumerate() {
+            for (byte, window) in from_sensors[sensor / 8].iter_mut().enumerate() {
+                *window |= ((byte >> (sensor % 8) & 1) << bit_of(cell)) as u16;
+            }
+        }
+        Self {
+            model,
+            from_sensors,
+        }
+    }
+
+    pub(super) fn model(&self) -> SensorModel {
+        self.model
+    }
+
+    /// A reading in window order, the action's place empty.
+    pub(super) fn window(&self, reading: u16) -> u16 {
+        let [low, high] = &self.from_sensors;
+        low[usize::from(reading & 0xff)] | high[usize::from(reading >> 8)]
+    }
+
+    /// A one for every sensor.
+    pub(super) fn sensors(&self) -> u16 {
+        self.window(self.model.mask().bits())
+    }
+
+    /// The window bits of sensor 0, 1, … and, last, of the action value: the inputs of a network.
+    pub(super) fn inputs(&self) -> impl Iterator<Item = usize> + use<> {
+        let cells = self.model.cells().iter().copied().map(bit_of);
+        cells.chain([ACTION_BIT.trailing_zeros() as usize])
+    }
+
+    /// Reading and action of a window.
+    pub(super) fn reading(&self, window: u16) -> (SensorBits, Action) {
+        let mut bits = 0;
+        for (sensor, &cell) in self.model.cells().iter().enumerate() {
+            bits |= (window >> bit_of(cell) & 1) << sensor;
+        }
+        let action = if window & ACTION_BIT == 0 {
+            Action::Straight
+        } else {
+            Action::Turn
+        };
+        (SensorBits::new(bits), action)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn readings_survive_the_way_into_window_order_and_back() {
+        for model in SensorModel::ALL {
+            let order = WindowOrder::new(model);
+            for bits in 0..=model.mask().bits() {
+                let window = order.window(bits);
+                assert_eq!(window & !order.sensors(), 0);
+                assert_eq!(order.reading(window).0.bits(), bits);
+            }
+            assert_eq!(order.sensors() & ACTION_BIT, 0);
+            assert_eq!(order.sensors().count_ones() as usize, model.sensors());
+            assert_eq!(order.window(1), AHEAD_BIT);
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! x86-64 vector paths. The only unsafe code of the crate is in this folder: the intrinsics that
+//! go through pointers, and calls of functions compiled for instructions that not every processor
+//! has. The latter are methods of [`Avx2`] and [`Avx512`], values of which exist only where the
+//! processor was found to have the instructions.
+#![allow(unsafe_code)]
+
+pub(super) mod avx2;
+pub(super) mod avx512;
+
+use super::board::Board;
+use super::lanes::{LANES, Lanes, Matches};
+use super::window::WindowOrder;
+use minimal_surprise_controller::Controller;
+
+/// Proof that the processor has AVX2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Avx2(());
+
+/// Proof that the processor has AVX-512 F, BW, VL, VBMI2, VNNI and BITALG, and GFNI.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Avx512(());
+
+/// What sensing and deciding need and change.
+pub(super) struct Sensing<'a> {
+    pub(super) board: &'a Board,
+    pub(super) robots: usize,
+    pub(super) words: &'a mut [u32],
+    /// The whole action table, and three bytes more.
+    pub(super) entries: &'a [u8],
+    /// Window bits that are sensors.
+    pub(super) sensors: u16,
+    pub(super) flips: Option<&'a [u16]>,
+    pub(super) inputs: &'a mut [u16],
+    pub(super) movers: &'a mut [u32],
+}
+
+impl Avx2 {
+    pub(super) fn detect() -> Option<Self> {
+        std::arch::is_x86_feature_detected!("avx2").then_some(Self(()))
+    }
+
+    pub(super) fn run_block(
+        self,
+        network: &avx2::Network,
+        lanes: &mut Lanes,
+        blocks: &[u64; LANES],
+        first_steps: usize,
+        matches: &mut Matches,
+    ) -> u32 {
+        // SAFETY: `self` exists only where AVX2 does.
+        unsafe { avx2::run_block(network, lanes, blocks, first_steps, matches) }
+    }
+}
+
+impl Avx512 {
+    pub(super) fn detect() -> Option<Self> {
+        (std::arch::is_x86_feature_detected!("avx512f")
+            && std::arch::is_x86_feature_detected!("avx512bw")
+            && std::arch::is_x86_feature_detected!("avx512vl")
+            && std::arch::is_x86_feature_detected!("avx512vbmi2")
+            && std::arch::is_x86_feature_detected!("avx512vnni")
+            && std::arch::is_x86_feature_detected!("avx512bitalg")
+            && std::arch::is_x86_feature_detected!("gfni"))
+        .then_some(Self(()))
+    }
+
+    pub(super) fn run_block(
+        self,
+        network: &avx512::Network,
+        lanes: &mut Lanes,
+        blocks: &[u64; LANES],
+        first_steps: usize,
+        matches: &mut Matches,
+    ) -> u32 {
+        // SAFETY: `self` exists only where the instructions do.
+        unsafe { network.run_block(lanes, blocks, first_steps, matches) }
+    }
+
+    /// Works out the entries of all windows.
+    pub(super) fn fill_action_table(
+        self,
+        controller: &Controller,
+        order: &WindowOrder,
+        entries: &mut [u8],
+    ) {
+        // SAFETY: `self` exists only where the instructions do.
+        unsafe { avx512::actions::fill_table(controller, order, entries) }
+    }
+
+    /// Turns those who turn and lists those who may move; the number of these is returned.
+    pub(super) fn sense_and_decide(self, sensing: Sensing<'_>) -> usize {
+        // SAFETY: `self` exists only where the instructions do.
+        unsafe { avx512::sensing::sense_and_decide(sensing) }
+    }
+}

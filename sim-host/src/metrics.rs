@@ -1,0 +1,453 @@
+//! Measures of a run: how well a swarm predicts, how much it moves, and how much of an earlier
+//! structure it kept.
+//!
+//! [`Measures`] watches a run step by step and keeps a few numbers a step and a robot, so that a
+//! million robots need no trace; [`Measures::of_trace`] gives the same numbers for a recorded run.
+//! N is the number of robots present, R the number of sensors, T the number of steps seen.
+//! Everything is counted in integers and divided once, when asked for.
+
+use crate::torus::{Grid, Pose};
+use crate::trace::Trace;
+use crate::world::World;
+use minimal_surprise_controller::sensor::MAX_SENSORS;
+use minimal_surprise_controller::{Action, Decision, SensorBits, SensorModel, Topology};
+use std::collections::BTreeSet;
+
+/// What is known of a run after the steps seen so far.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Measures {
+    grid: Grid,
+    model: SensorModel,
+    poses: Vec<Pose>,
+    predictions: Vec<SensorBits>,
+    /// Of each robot, bits mispredicted in the last step.
+    mispredicted_now: Vec<u8>,
+    /// Of each step: robots that moved, robots that went straight, bits mispredicted.
+    moved: Vec<u32>,
+    straight: Vec<u32>,
+    mispredicted: Vec<u64>,
+    /// Of each sensor, how often it was predicted occupied.
+    predicted_occupied: [u64; MAX_SENSORS],
+}
+
+impl Measures {
+    /// A run that starts from these poses, no step done yet.
+    #[must_use]
+    pub fn starting_from(grid: Grid, topology: Topology, starts: &[Pose]) -> Self {
+        Self {
+            grid,
+            model: topology.model(),
+            poses: starts.to_vec(),
+            predictions: vec![topology.fixed(); starts.len()],
+            mispredicted_now: vec![0; starts.len()],
+            moved: Vec::new(),
+            straight: Vec::new(),
+            mispredicted: Vec::new(),
+            predicted_occupied: [0; MAX_SENSORS],
+        }
+    }
+
+    /// Takes in the step that the world has just done.
+    ///
+    /// # Panics
+    /// If the world has another number of robots.
+    pub fn observe(&mut self, world: &World) {
+        self.take_in(world.poses(), world.readings(), world.decisions());
+    }
+
+    /// The measures of a recorded run.
+    ///
+    /// # Panics
+    /// If the number of robots changes during the run.
+    #[must_use]
+    pub fn of_trace(grid: Grid, topology: Topology, trace: &Trace) -> Self {
+        let starts = trace.steps.first().map_or(&trace.final_poses, |s| &s.poses);
+        let mut measures = Self::starting_from(grid, topology, starts);
+        measures.replay(trace, |_| {});
+        measures
+    }
+
+    /// Takes in the steps of a trace, showing the state after each to `observe`.
+    fn replay(&mut self, trace: &Trace, mut observe: impl FnMut(&Self)) {
+        let after = trace.steps.iter().skip(1).map(|step| &step.poses);
+        let after = after.chain([&trace.final_poses]);
+        for (step, poses) in trace.steps.iter().zip(after) {
+            self.take_in(poses, &step.readings, &step.decisions);
+            observe(self);
+        }
+    }
+
+    /// One step: the poses after it, and what was sensed and decided in it.
+    fn take_in(&mut self, poses: &[Pose], readings: &[SensorBits], decisions: &[Decision]) {
+        let robots = self.poses.len();
+        assert!(
+            [poses.len(), readings.len(), decisions.len()] == [robots; 3],
+            "the number of robots does not change during a run"
+        );
+        // A robot moves by at most one cell a step, so that the distance is 0 or 1, also across
+        // the edge.
+        let moved = self.poses.iter().zip(poses);
+        let moved = moved.filter(|(from, to)| (from.x, from.y) != (to.x, to.y));
+        self.moved.push(moved.count() as u32);
+        self.poses.copy_from_slice(poses);
+
+        let straight = decisions.iter().filter(|d| d.action == Action::Straight);
+        self.straight.push(straight.count() as u32);
+
+        // Noise also flips bits that the model has no sensor for.
+        let sensed = self.model.mask().bits();
+        let mut mispredicted = 0;
+        for (now, (prediction, &reading)) in self
+            .mispredicted_now
+            .iter_mut()
+            .zip(self.predictions.iter().zip(readings))
+        {
+            let differing = prediction.differing(SensorBits::new(reading.bits() & sensed));
+            *now = differing as u8;
+            mispredicted += u64::from(differing);
+            for (sensor, count) in self.predicted_occupied.iter_mut().enumerate() {
+                *count += u64::from(prediction.get(sensor));
+            }
+        }
+        self.mispredicted.push(mispredicted);
+        for (prediction, decision) in self.predictions.iter_mut().zip(decisions) {
+            *prediction = decision.prediction;
+        }
+    }
+
+    /// Steps seen, T.
+    #[must_use]
+    pub fn steps(&self) -> u32 {
+        self.moved.len() as u32
+    }
+
+    /// Poses after the last step seen.
+    #[must_use]
+    pub fn poses(&self) -> &[Pose] {
+        &self.poses
+    }
+
+    /// Fitness F = 1/(N·T·R) Σₜ Σₙ Σᵣ (1 − |pₙʳ(t) − sₙʳ(t)|), from 0 (every bit mispredicted) to
+    /// 1 (none); 0 before the first step. pₙʳ(t) is the prediction made at t − 1; at t = 0 it is
+    /// the template, or 0 (paper, Eq. 1).
+    #[must_use]
+    pub fn fitness(&self) -> f64 {
+        let bits = self.bits_per_step() * self.moved.len() as u64;
+        let mispredicted: u64 = self.mispredicted.iter().sum();
+        ratio(bits - mispredicted, bits)
+    }
+
+    /// Average prediction of each sensor, 1/(N·T) Σₜ Σₙ pₙʳ(t), from 0 (always empty) to 1 (always
+    /// occupied), of the predictions that count for the fitness (paper, Fig. 9).
+    #[must_use]
+    pub fn average_prediction(&self) -> Vec<f64> {
+        let readings = self.robots() * self.moved.len() as u64;
+        let counts = &self.predicted_occupied[..self.model.sensors()];
+        counts.iter().map(|&count| ratio(count, readings)).collect()
+    }
+
+    /// Temperature T(t) = Mₓ(t) + M_y(t) of each step, with Mₓ(t) = 1/N Σₙ |xₙ(t) − xₙ(t+1)|, in
+    /// cells a step and robot, from 0 to 1. A move across the edge is one cell (paper, Eqs. 2–3).
+    #[must_use]
+    pub fn temperature(&self) -> Vec<f64> {
+        let moved = self.moved.iter();
+        moved.map(|&n| ratio(n.into(), self.robots())).collect()
+    }
+
+    /// Robot movement M = 1/τ Σ T(t) over the last τ steps, in cells a step and robot, from 0 to 1
+    /// (paper, Eq. 4). τ is [`Measures::period`].
+    #[must_use]
+    pub fn movement(&self) -> f64 {
+        self.mean_over_period(&self.moved)
+    }
+
+    /// Intended robot movement I = 1/(N·τ) Σₙ Σₜ aₙ(t) over the last τ steps, aₙ(t) = 1 for a robot
+    /// that went straight whether it could or not, in cells a step and robot, from 0 to 1 (paper,
+    /// Eq. 5; its a is 1 where the networks' action value is 0). I ≥ M. τ is [`Measures::period`].
+    #[must_use]
+    pub fn intended_movement(&self) -> f64 {
+        self.mean_over_period(&self.straight)
+    }
+
+    /// τ = ⌈Lx·Ly / 2⌉ steps, at most the steps seen (paper, Sec. 2.1).
+    #[must_use]
+    pub fn period(&self) -> u32 {
+        self.grid.cells().div_ceil(2).min(self.steps())
+    }
+
+    /// Surprise of the swarm in each step, 1/(N·R) Σₙ Σᵣ |pₙʳ(t) − sₙʳ(t)|, from 0 to 1. One minus
+    /// its mean over the steps is the fitness.
+    #[must_use]
+    pub fn surprise(&self) -> Vec<f64> {
+        let bits = self.bits_per_step();
+        self.mispredicted.iter().map(|&n| ratio(n, bits)).collect()
+    }
+
+    /// Surprise of each robot in the last step, 1/R Σᵣ |pₙʳ(t) − sₙʳ(t)|, from 0 to 1; 0 before the
+    /// first step.
+    #[must_use]
+    pub fn surprise_of_robots(&self) -> Vec<f64> {
+        let bits = self.model.sensors() as u64;
+        let now = self.mispredicted_now.iter();
+        now.map(|&n| ratio(n.into(), bits)).collect()
+    }
+
+    fn robots(&self) -> u64 {
+        self.poses.len() as u64
+    }
+
+    /// N·R.
+    fn bits_per_step(&self) -> u64 {
+        self.robots() * self.model.sensors() as u64
+    }
+
+    /// Mean over robots and the last τ steps.
+    fn mean_over_period(&self, robots_of_steps: &[u32]) -> f64 {
+        let period = self.period();
+        let first = robots_of_steps.len() - period as usize;
+        let sum: u64 = robots_of_steps[first..].iter().map(|&n| u64::from(n)).sum();
+        ratio(sum, self.robots() * u64::from(period))
+    }
+}
+
+/// Surprise of each robot over time: for every step of a trace, [`Measures::surprise_of_robots`].
+///
+/// # Panics
+/// If the number of robots changes during the run.
+#[must_use]
+pub fn surprise_over_time(grid: Grid, topology: Topology, trace: &Trace) -> Vec<Vec<f64>> {
+    let starts = trace.steps.first().map_or(&trace.final_poses, |s| &s.poses);
+    let mut rows = Vec::with_capacity(trace.steps.len());
+    Measures::starting_from(grid, topology, starts).replay(trace, |measures| {
+        rows.push(measures.surprise_of_robots());
+    });
+    rows
+}
+
+/// What a robot of one state has in common with a robot of another to count as a match.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Match {
+    /// Cell and heading.
+    Pose,
+    /// The cell only: for triangular lattices, whose robots keep turning.
+    Cell,
+}
+
+/// Similarity S = 1/N Σ m(pᵢ) over the robots of the later state, from 0 to 1: m is 1 where the
+/// earlier state, the undamaged final one, has a robot on the same cell and, unless `matching` says
+/// otherwise, with the same heading. N is the number of robots of the earlier state, so that
+/// removed robots lower S; 0 if there were none (paper, Eqs. 6–7).
+#[must_use]
+pub fn similarity(after: &[Pose], before: &[Pose], matching: Match) -> f64 {
+    let key = |pose: &Pose| {
+        let heading = match matching {
+            Match::Pose => Some(pose.heading as u8),
+            Match::Cell => None,
+        };
+        (pose.x, pose.y, heading)
+    };
+    let earlier: BTreeSet<_> = before.iter().map(key).collect();
+    let matches = after.iter().filter(|pose| earlier.contains(&key(pose)));
+    ratio(matches.count() as u64, before.len() as u64)
+}
+
+/// A quotient; 0 of nothing.
+fn ratio(part: u64, whole: u64) -> f64 {
+    part as f64 / whole.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drawing::parse;
+    use crate::evaluation::run;
+    use crate::noise::{NoiseRate, NoiseStream};
+    use crate::scenario::Scenario;
+    use crate::seed::{Purpose, SeedTree};
+    use minimal_surprise_controller::{Controller, Genome, Prediction, Template, Turn};
+
+    fn topology(prediction: Prediction) -> Topology {
+        Topology::new(SensorModel::A, prediction).unwrap()
+    }
+
+    /// Runs a drawn world on given decisions: one row a step, one decision a robot.
+    fn driven(drawing: &str, topology: Topology, steps: &[Vec<Decision>]) -> (Measures, Trace) {
+        let (grid, starts) = parse(drawing).unwrap();
+        let controller = Controller::new(&Genome::zeroed(topology));
+        let mut world = World::new(grid, &starts, &controller).unwrap();
+        let stream = SeedTree::new(0).stream(Purpose::Noise, 0, 0);
+        let mut noise = NoiseStream::new(stream, NoiseRate::NONE);
+        let mut measures = Measures::starting_from(grid, topology, &starts);
+        let mut trace = Trace::starting_from(&world);
+        for decisions in steps {
+            world.step_with(&mut noise, |_| decisions.clone());
+            measures.observe(&world);
+            trace.record(&world);
+        }
+        assert_eq!(Measures::of_trace(grid, topology, &trace), measures);
+        (measures, trace)
+    }
+
+    fn decision(action: Action, prediction: u16) -> Decision {
+        Decision {
+            action,
+            turn: Turn::CounterClockwise,
+            prediction: SensorBits::new(prediction),
+        }
+    }
+
+    /// Two robots that face each other and go straight: each senses one robot, right ahead (bit 0
+    /// of the eight of model A), in both steps. The first expects it at t = 1, the second does not.
+    fn facing_pair(prediction: Prediction) -> (Measures, Trace) {
+        let step = vec![
+            decision(Action::Straight, 0b1),
+            decision(Action::Straight, 0b0),
+        ];
+        let drawing = "·····\n·····\n·▶◀··\n·····\n·····";
+        driven(drawing, topology(prediction), &[step.clone(), step])
+    }
+
+    #[test]
+    fn fitness_is_the_share_of_bits_as_predicted() {
+        // t = 0: nothing is expected, each robot has 7 of 8 bits right; t = 1: 8 and 7.
+        // F = (7 + 7 + 8 + 7) / (2 robots · 2 steps · 8 sensors) = 29/32.
+        let (measures, _) = facing_pair(Prediction::Free);
+        assert_eq!(measures.fitness(), 29.0 / 32.0);
+        // With the pair predefined, bit 0 is expected at t = 0: (8 + 8 + 8 + 7) / 32.
+        let (measures, _) = facing_pair(Prediction::Predefined(Template::Pair));
+        assert_eq!(measures.fitness(), 31.0 / 32.0);
+    }
+
+    #[test]
+    fn average_prediction_is_over_the_predictions_that_are_scored() {
+        // Bit 0 is expected by none of two robots at t = 0 and by one at t = 1: 1 of 4. What they
+        // predict in the last step is never compared.
+        let (measures, _) = facing_pair(Prediction::Free);
+        let expected = [0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        assert_eq!(measures.average_prediction(), expected);
+        let (measures, _) = facing_pair(Prediction::Predefined(Template::Pair));
+        assert_eq!(measures.average_prediction()[0], 0.75);
+    }
+
+    #[test]
+    fn surprise_is_the_share_of_bits_not_as_predicted() {
+        // t = 0: one of 8 bits for each robot; t = 1: none for the first, one for the second.
+        let (measures, trace) = facing_pair(Prediction::Free);
+        let over_time = surprise_over_time(
+            parse("·····\n".repeat(5).as_str()).unwrap().0,
+            topology(Prediction::Free),
+            &trace,
+        );
+        assert_eq!(over_time, [[0.125, 0.125], [0.0, 0.125]]);
+        assert_eq!(measures.surprise_of_robots(), [0.0, 0.125]);
+        // Swarm: 2/16, then 1/16; 1 − their mean is the fitness 29/32.
+        assert_eq!(measures.surprise(), [0.125, 0.0625]);
+        let mean = (0.125 + 0.0625) / 2.0;
+        assert_eq!(1.0 - mean, measures.fitness());
+    }
+
+    /// On 3 × 3 cells for 7 steps: robot 0 runs around the southern row, across the edge; robot 1
+    /// turns three times (north, west, south, east), then runs around the middle row; robots 2 and
+    /// 3 in the northern row block each other.
+    fn busy() -> Measures {
+        let steps: Vec<Vec<Decision>> = (0..7)
+            .map(|t| {
+                let second = if t < 3 {
+                    Action::Turn
+                } else {
+                    Action::Straight
+                };
+                [Action::Straight, second, Action::Straight, Action::Straight]
+                    .map(|action| decision(action, 0))
+                    .to_vec()
+            })
+            .collect();
+        driven("▶◀·\n·▲·\n▶··", Topology::default(), &steps).0
+    }
+
+    #[test]
+    fn temperature_is_the_share_of_robots_that_moved() {
+        // Robot 0 of four moves at t = 0 to 2, robots 0 and 1 from t = 3 on.
+        let expected = [0.25, 0.25, 0.25, 0.5, 0.5, 0.5, 0.5];
+        assert_eq!(busy().temperature(), expected);
+    }
+
+    #[test]
+    fn movement_is_the_mean_temperature_of_the_last_half_as_many_steps_as_cells() {
+        // τ = ⌈9/2⌉ = 5, t = 2 to 6: M = (0.25 + 4 · 0.5) / 5 = 0.45.
+        let measures = busy();
+        assert_eq!(measures.period(), 5);
+        assert_eq!(measures.movement(), 0.45);
+    }
+
+    #[test]
+    fn intended_movement_counts_blocked_robots_too() {
+        // Straight at t = 2 to 6: robots 0, 2 and 3 five times each, robot 1 four times.
+        // I = 19 / (4 robots · 5 steps) = 0.95.
+        assert_eq!(busy().intended_movement(), 0.95);
+    }
+
+    #[test]
+    fn the_period_is_that_of_the_paper_and_at_most_the_run() {
+        let period = |side, steps: usize| {
+            let grid = Grid::new(side, side).unwrap();
+            let mut measures = Measures::starting_from(grid, Topology::default(), &[]);
+            for _ in 0..steps {
+                measures.take_in(&[], &[], &[]);
+            }
+            measures.period()
+        };
+        assert_eq!((period(15, 500), period(20, 500)), (113, 200));
+        assert_eq!((period(20, 50), period(20, 0)), (50, 0));
+    }
+
+    #[test]
+    fn before_the_first_step_and_without_robots_every_measure_is_zero() {
+        let (grid, starts) = parse("▶◀·\n···\n···").unwrap();
+        for starts in [&starts[..], &[]] {
+            let measures = Measures::starting_from(grid, Topology::default(), starts);
+            let all = [
+                measures.fitness(),
+                measures.movement(),
+                measures.intended_movement(),
+                measures.average_prediction()[0],
+            ];
+            assert_eq!(all, [0.0; 4]);
+        }
+    }
+
+    #[test]
+    fn similarity_is_the_share_of_the_original_robots_found_again() {
+        let before = parse("▶▶◀·\n····\n▲··▼").unwrap().1;
+        // Of five robots, the southern two and one of the line are as before, one has turned, and
+        // one is gone: 3/5 with headings, 4/5 without.
+        let after = parse("▶▲··\n····\n▲··▼").unwrap().1;
+        assert_eq!(similarity(&after, &before, Match::Pose), 0.6);
+        assert_eq!(similarity(&after, &before, Match::Cell), 0.8);
+        assert_eq!(similarity(&before, &before, Match::Pose), 1.0);
+        // Which robot it is does not matter.
+        let renumbered: Vec<Pose> = before.iter().rev().copied().collect();
+        assert_eq!(similarity(&renumbered, &before, Match::Pose), 1.0);
+        assert_eq!(similarity(&[], &before, Match::Cell), 0.0);
+    }
+
+    #[test]
+    fn fitness_and_average_predictions_are_those_of_the_evaluation() {
+        let grid = Grid::new(9, 7).unwrap();
+        let scenario = Scenario::new(grid, 20, 40, NoiseRate::new(0.1).unwrap()).unwrap();
+        let seeds = SeedTree::new(3);
+        for (index, topology) in (0..).zip(Topology::ALL) {
+            let mut stream = seeds.stream(Purpose::InitialGenome, 0, index);
+            let controller = Controller::new(&Genome::random(topology, &mut stream));
+            let trial = scenario.trial(seeds, 0, index);
+            let mut measures = Measures::starting_from(grid, topology, &trial.starts);
+            let outcome = run(&controller, &scenario, &trial, |world| {
+                measures.observe(world);
+            });
+            let outcome = outcome.unwrap();
+            assert_eq!(measures.fitness(), outcome.fitness());
+            assert_eq!(measures.average_prediction(), outcome.average_prediction());
+            assert_eq!(measures.poses(), outcome.final_poses);
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! Lines: robots in a row that hold each other in place.
+//!
+//! Along an axis, take a maximal run of neighbouring robots whose headings lie on that axis, and
+//! drop the robots that point outward from both of its ends. What is left is a line if it has at
+//! least [`LENGTH_MIN`] robots and no two adjacent cells beside it, on the same side, are both
+//! occupied. A run around the whole torus needs no ends (paper, Sec. 2.2, rules 1 to 3).
+//!
+//! The paper also asks for at most half the length of neighbours on a side. Of n cells in a row
+//! no two of which are adjacent there are at most ⌈n/2⌉, so that this holds by itself.
+
+use super::field::Field;
+use crate::torus::Heading;
+
+/// Fewest robots of a line.
+pub const LENGTH_MIN: usize = 3;
+
+/// Direction that a line runs in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Axis {
+    /// From west to east.
+    Horizontal,
+    /// From south to north.
+    Vertical,
+}
+
+impl Axis {
+    /// Every axis, in order.
+    pub const ALL: [Self; 2] = [Self::Horizontal, Self::Vertical];
+
+    /// The heading along the axis; the other on it is its reverse.
+    fn forward(self) -> Heading {
+        match self {
+            Self::Horizontal => Heading::East,
+            Self::Vertical => Heading::North,
+        }
+    }
+
+    fn backward(self) -> Heading {
+        match self {
+            Self::Horizontal => Heading::West,
+            Self::Vertical => Heading::South,
+        }
+    }
+
+    fn has(self, heading: Heading) -> bool {
+        heading == self.forward() || heading == self.backward()
+    }
+}
+
+/// One line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Line {
+    /// Direction that it runs in.
+    pub axis: Axis,
+    /// Its robots, in order along the axis.
+    pub robots: Vec<u32>,
+    /// Whether it runs around the whole torus.
+    pub spanning: bool,
+}
+
+/// How many lines there are, and which way they run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LineCounts {
+    /// Lines from west to east.
+    pub horizontal: u32,
+    /// Lines from south to north.
+    pub vertical: u32,
+    /// Lines around the whole torus, of either direction.
+    pub spanning: u32,
+}
+
+/// Which way most lines of a swarm run (paper, Sec. 3.3.2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LineOrientation {
+    /// More than two thirds of the lines are horizontal.
+    MostlyHorizontal,
+    /// More than two thirds of the lines are vertical.
+    MostlyVertical,
+    /// Neither.
+    MazeLike,
+}
+
+impl LineOrientation {
+    /// Every orientation, in order.
+    pub const ALL: [Self; 3] = [Self::MostlyHorizontal, Self::MostlyVertical, Self::MazeLike];
+
+    /// The name used in files and tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MostlyHorizontal => "mostly horizontal",
+            Self::MostlyVertical => "mostly vertical",
+            Self::MazeLike => "maze-like",
+        }
+    }
+
+    /// What a genome forms from many starts: the orientation of more than half of the runs, or
+    /// `None` if there is no such (the paper's *diverse*). Runs without lines count as runs.
+    #[must_use]
+    pub fn of_most(runs: &[Option<Self>]) -> Option<Self> {
+        Self::ALL.into_iter().find(|&orientation| {
+            let formed = runs.iter().filter(|&&run| run == Some(orientation));
+            2 * formed.count() > runs.len()
+        })
+    }
+}
+
+impl LineCounts {
+    pub(super) fn of(lines: &[Line]) -> Self {
+        let mut counts = Self::default();
+        for line in lines {
+            match line.axis {
+                Axis::Horizontal => counts.horizontal += 1,
+                Axis::Vertical => counts.vertical += 1,
+            }
+            counts.spanning += u32::from(line.spanning);
+        }
+        counts
+    }
+
+    /// Lines of either direction.
+    #[must_use]
+    pub fn total(self) -> u32 {
+        self.horizontal + self.vertical
+    }
+
+    /// Which way most of them run; `None` without lines.
+    #[must_use]
+    pub fn orientation(self) -> Option<LineOrientation> {
+        if self.total() == 0 {
+            None
+        } else if 3 * self.horizontal > 2 * self.total() {
+            Some(LineOrientation::MostlyHorizontal)
+        } else if 3 * self.vertical > 2 * self.total() {
+            Some(LineOrientation::MostlyVertical)
+        } else {
+            Some(LineOrientation::MazeLike)
+        }
+    }
+}
+
+/// All lines: the horizontal ones, then the vertical ones.
+pub(super) fn find(field: &Field) -> Vec<Line> {
+    let mut lines = Vec::new();
+    let mut seen = vec![false; field.robots()];
+    for axis in Axis::ALL {
+        let mut add = |run: &[u32], ring: bool| {
+            let robots = if ring {
+                run
+            } else {
+                without_outward(field, axis, run)
+            };
+            if robots.len() >= LENGTH_MIN && sides_are_free(field, axis, robots, ring) {
+                lines.push(Line {
+                    axis,
+                    robots: robots.to_vec(),
+                    spanning: ring,
+                });
+            }
+        };
+        let behind = axis.backward().ahead();
+        let on_axis = |robot: &u32| axis.has(field.heading(*robot));
+        let mut run = Vec::new();
+        for first in field.row_by_row().filter(on_axis) {
+            if field
+                .near(first, behind)
+                .is_none_or(|robot| !on_axis(&robot))
+            {
+                follow(field, axis, first, &mut seen, &mut run);
+                add(&run, false);
+            }
+        }
+        // A run that no robot is the first of goes around the torus.
+        for first in field.row_by_row().filter(on_axis) {
+            if !seen[first as usize] {
+                follow(field, axis, first, &mut seen, &mut run);
+                add(&run, true);
+            }
+        }
+    }
+    lines
+}
+
+/// Fills `run` with the robots on the axis from `first` on, up to a gap or back to `first`.
+fn follow(field: &Field, axis: Axis, first: u32, seen: &mut [bool], run: &mut Vec<u32>) {
+    run.clear();
+    let mut next = Some(first);
+    while let Some(robot) = next {
+        seen[robot as usize] = true;
+        run.push(robot);
+        next = field
+            .near(robot, axis.forward().ahead())
+            .filter(|&robot| axis.has(field.heading(robot)) && robot != first);
+    }
+}
+
+/// The run without the robots that point outward from its ends.
+fn without_outward<'a>(field: &Field, axis: Axis, run: &'a [u32]) -> &'a [u32] {
+    let points = |heading| move |&robot: &u32| field.heading(robot) == heading;
+    let first = run.iter().position(points(axis.forward()));
+    let last = run.iter().rposition(points(axis.backward()));
+    match (first, last) {
+        (Some(first), Some(last)) if first < last => &run[first..=last],
+        _ => &[],
+    }
+}
+
+/// Whether on neither side two adjacent cells beside the line are occupied.
+fn sides_are_free(field: &Field, axis: Axis, line: &[u32], ring: bool) -> bool {
+    let (dx, dy) = axis.forward().ahead();
+    [(dy, dx), (-dy, -dx)].into_iter().all(|side| {
+        let beside = |&robot: &u32| field.occupied(robot, side);
+        let closed = ring && line.first().is_some_and(beside) && line.last().is_some_and(beside);
+        !closed && !line.windows(2).any(|two| two.iter().all(beside))
+    })
+}

@@ -1,0 +1,235 @@
+//! Structures: what a swarm has assembled into (paper, Sec. 2.2), on any torus, for any number of
+//! robots, in time linear in cells and robots.
+//!
+//! A robot may belong to several structures. A run is named after the structure that holds most
+//! robots.
+
+mod clusters;
+mod dispersion;
+mod field;
+mod lines;
+mod pairs;
+#[cfg(test)]
+mod tests;
+
+pub use clusters::{Clusters, Grouping, MOORE_MIN, VON_NEUMANN_MIN};
+pub use lines::{Axis, LENGTH_MIN, Line, LineCounts, LineOrientation};
+
+use crate::metrics::Match;
+use crate::torus::{Grid, Pose};
+use crate::world::WorldError;
+use field::Field;
+
+/// The paper's eight structures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Structure {
+    /// Robots in a row, pointing inwards at both ends, or around the torus.
+    Line,
+    /// Two robots that face each other.
+    Pair,
+    /// One cluster.
+    Aggregation,
+    /// Several clusters, not all connected.
+    Clustering,
+    /// Several clusters, all connected.
+    LooseGrouping,
+    /// Robots with at most one neighbour.
+    RandomDispersion,
+    /// Robots on the corners of 3 × 3 blocks, nothing else around.
+    Square,
+    /// Robots on every second cell, alternate rows shifted by one.
+    TriangularLattice,
+}
+
+impl Structure {
+    /// Every structure, in order.
+    pub const ALL: [Self; 8] = [
+        Self::Line,
+        Self::Pair,
+        Self::Aggregation,
+        Self::Clustering,
+        Self::LooseGrouping,
+        Self::RandomDispersion,
+        Self::Square,
+        Self::TriangularLattice,
+    ];
+
+    /// The name used in files and tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Line => "line",
+            Self::Pair => "pair",
+            Self::Aggregation => "aggregation",
+            Self::Clustering => "clustering",
+            Self::LooseGrouping => "loose grouping",
+            Self::RandomDispersion => "random dispersion",
+            Self::Square => "square",
+            Self::TriangularLattice => "triangular lattice",
+        }
+    }
+}
+
+impl Structure {
+    /// What similarity to an earlier state goes by: triangular lattices are compared by cells,
+    /// since their robots keep turning, everything else by poses (paper, Sec. 3.4).
+    #[must_use]
+    pub fn matching(self) -> Match {
+        match self {
+            Self::TriangularLattice => Match::Cell,
+            _ => Match::Pose,
+        }
+    }
+}
+
+impl From<Grouping> for Structure {
+    fn from(grouping: Grouping) -> Self {
+        match grouping {
+            Grouping::Aggregation => Self::Aggregation,
+            Grouping::LooseGrouping => Self::LooseGrouping,
+            Grouping::Clustering => Self::Clustering,
+        }
+    }
+}
+
+impl core::fmt::Display for Structure {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// What a swarm has assembled into, and which robots belong to it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Structures {
+    swarm_size: u32,
+    lines: Vec<Line>,
+    pairs: Vec<[u32; 2]>,
+    clusters: Clusters,
+    in_line: Vec<bool>,
+    in_pair: Vec<bool>,
+    in_cluster: Vec<bool>,
+    dispersed: Vec<bool>,
+    in_square: Vec<bool>,
+    in_lattice: Vec<bool>,
+}
+
+/// Finds every structure of a swarm.
+///
+/// # Errors
+/// [`WorldError`] if a robot is outside the grid or two share a cell.
+pub fn classify(grid: Grid, poses: &[Pose]) -> Result<Structures, WorldError> {
+    let field = Field::new(grid, poses)?;
+    let members = |robots: &mut dyn Iterator<Item = u32>| {
+        let mut members = vec![false; poses.len()];
+        robots.for_each(|robot| members[robot as usize] = true);
+        members
+    };
+    let lines = lines::find(&field);
+    let in_line = members(&mut lines.iter().flat_map(|line| line.robots.iter().copied()));
+    let pairs = pairs::find(&field, &in_line);
+    let in_pair = members(&mut pairs.iter().flatten().copied());
+    let clusters = clusters::find(&field);
+    let in_cluster = members(&mut clusters.robots().iter().copied());
+    let in_square = dispersion::in_squares(&field);
+    let in_lattice = dispersion::in_triangular_lattices(&field);
+    let dispersed = dispersion::randomly_dispersed(&field, |robot| {
+        let robot = robot as usize;
+        in_line[robot] || in_pair[robot] || in_square[robot]
+    });
+    Ok(Structures {
+        swarm_size: poses.len() as u32,
+        lines,
+        pairs,
+        clusters,
+        in_line,
+        in_pair,
+        in_cluster,
+        dispersed,
+        in_square,
+        in_lattice,
+    })
+}
+
+impl Structures {
+    /// Whether a robot belongs to a structure; false for an index beyond the swarm.
+    #[must_use]
+    pub fn contains(&self, structure: Structure, robot: u32) -> bool {
+        self.members(structure)
+            .is_some_and(|members| members.get(robot as usize) == Some(&true))
+    }
+
+    /// Indices of the robots that belong to a structure, ascending.
+    pub fn robots_in(&self, structure: Structure) -> impl Iterator<Item = u32> {
+        (0..self.swarm_size).filter(move |&robot| self.contains(structure, robot))
+    }
+
+    /// Number of robots that belong to a structure.
+    #[must_use]
+    pub fn count(&self, structure: Structure) -> u32 {
+        let members = self.members(structure).unwrap_or_default();
+        members.iter().filter(|&&member| member).count() as u32
+    }
+
+    /// Share of the robots present that belong to a structure, 0 to 1; 0 without robots.
+    #[must_use]
+    pub fn share(&self, structure: Structure) -> f64 {
+        f64::from(self.count(structure)) / f64::from(self.swarm_size.max(1))
+    }
+
+    /// Number of robots present.
+    #[must_use]
+    pub fn swarm_size(&self) -> u32 {
+        self.swarm_size
+    }
+
+    /// The lines: the horizontal ones, then the vertical ones.
+    #[must_use]
+    pub fn lines(&self) -> &[Line] {
+        &self.lines
+    }
+
+    /// How many lines there are, and which way they run.
+    #[must_use]
+    pub fn line_counts(&self) -> LineCounts {
+        LineCounts::of(&self.lines)
+    }
+
+    /// The pairs.
+    #[must_use]
+    pub fn pairs(&self) -> &[[u32; 2]] {
+        &self.pairs
+    }
+
+    /// The clusters. Their robots count for the one of aggregation, clustering and loose grouping
+    /// that the clusters amount to.
+    #[must_use]
+    pub fn clusters(&self) -> &Clusters {
+        &self.clusters
+    }
+
+    /// What the run is named after: the structures that hold most robots, usually one. If there
+    /// are k of them the run counts 1/k for each; none if no robot is in any structure.
+    #[must_use]
+    pub fn names(&self) -> Vec<Structure> {
+        let counts = Structure::ALL.map(|structure| (structure, self.count(structure)));
+        let most = counts.iter().map(|&(_, count)| count).max().unwrap_or(0);
+        let named = counts
+            .iter()
+            .filter(|&&(_, count)| count == most && most > 0);
+        named.map(|&(structure, _)| structure).collect()
+    }
+
+    fn members(&self, structure: Structure) -> Option<&[bool]> {
+        match structure {
+            Structure::Line => Some(&self.in_line),
+            Structure::Pair => Some(&self.in_pair),
+            Structure::Aggregation | Structure::Clustering | Structure::LooseGrouping => {
+                (self.clusters.grouping().map(Structure::from) == Some(structure))
+                    .then_some(&self.in_cluster)
+            }
+            Structure::RandomDispersion => Some(&self.dispersed),
+            Structure::Square => Some(&self.in_square),
+            Structure::TriangularLattice => Some(&self.in_lattice),
+        }
+    }
+}

@@ -1,0 +1,97 @@
+#!/bin/sh
+# Passes every test: ./test.sh, or ./test.sh --all with those that take longer.
+#
+# Provides what it needs (a C linker, the thumbv7em targets, QEMU, rustfmt and clippy), saying what
+# it installs. Needs Rust and, where one of these is missing, Debian's apt-get as root or by sudo.
+set -eu
+cd "$(dirname "$0")"
+
+case "$*" in
+    '') ;;
+    --all) export TEST_ALL=1 ;;
+    *) echo 'usage: ./test.sh [--all]' >&2 && exit 2 ;;
+esac
+
+# Set by those who call this, not below: then nothing may be left out.
+strict=${CI:-}
+# A test that lacks a tool fails instead of being skipped.
+export CI=true
+
+started=$(date +%s)
+say() { echo "== $* ($(($(date +%s) - started)) s)"; }
+
+if ! command -v cargo >/dev/null; then
+    PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+fi
+if ! command -v cargo >/dev/null; then
+    echo 'test.sh: no cargo here; install Rust 1.95 or newer, e.g. by rustup' >&2
+    exit 69
+fi
+
+# Says which part of Rust is there, after adding it where it is not and can be added.
+component() {
+    name=$1 command=$2 package=$3
+    cargo "$command" --version 2>/dev/null && return
+    if command -v rustup >/dev/null; then
+        timeout 120 rustup component add "$name" || true
+    elif [ "$(command -v cargo)" = /usr/bin/cargo ]; then
+        scripts/apt-install.sh "$package" || true
+    fi
+    cargo "$command" --version 2>/dev/null && return
+    echo "test.sh: no $name, so nothing is checked with it" >&2
+    [ "$strict" != true ] || exit 69
+    return 1
+}
+
+say 'tools'
+command -v cc >/dev/null || scripts/apt-install.sh gcc libc6-dev
+command -v qemu-system-arm >/dev/null || scripts/apt-install.sh qemu-system-arm
+qemu-system-arm --version | head -n 1
+export PROVIDE_TOOLS=1
+targets='thumbv7em-none-eabihf thumbv7em-none-eabi'
+for target in $targets; do
+    scripts/thumb-cargo.sh --compiler --target "$target"
+done
+cargo --version
+rustfmt=1 clippy=1
+component rustfmt fmt rustfmt-web || rustfmt=0
+component clippy clippy rust-web-clippy || clippy=0
+
+if [ $rustfmt = 1 ]; then
+    say 'format'
+    cargo fmt --all --check
+    cargo fmt --manifest-path firmware-example/Cargo.toml --check
+fi
+
+if [ $clippy = 1 ]; then
+    say 'lints'
+    cargo clippy --locked --workspace --all-targets --all-features -- -D warnings
+    if scripts/thumb-cargo.sh --compiler 2>&1 | grep -q 'from its source'; then
+        echo 'test.sh: clippy has no core library for the target: only the portable part of the firmware'
+        cargo clippy --locked --manifest-path firmware-example/Cargo.toml --lib -- -D warnings
+    else
+        (cd firmware-example && ../scripts/thumb-cargo.sh clippy --locked -- -D warnings)
+    fi
+fi
+
+say 'docs'
+RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --all-features --no-deps
+
+say 'the controller for the Cortex-M4'
+for target in $targets; do
+    for features in '' neighbours,defmt; do
+        example=
+        [ -z "$features" ] || example='--example embed'
+        # shellcheck disable=SC2086 # an option and its value
+        scripts/thumb-cargo.sh build --locked --release --package minimal-surprise-controller \
+            --lib $example --features "$features" --target "$target"
+    done
+done
+
+say 'packages'
+cargo package --locked --workspace --exclude tests --allow-dirty --no-verify
+
+say 'tests'
+cargo test --locked --workspace --all-features -- --show-output
+
+say 'everything passed'

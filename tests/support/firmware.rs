@@ -1,0 +1,151 @@
+//! Building the firmware programs and running them under QEMU.
+
+use crate::tools::Missing;
+use defmt_decoder::{DecodeError, Table};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+use std::{fs, thread};
+
+/// What `scripts/thumb-cargo.sh` exits with if it finds no compiler.
+const NO_COMPILER: i32 = 69;
+
+/// Longest that a program may take. A program that has crashed may never end.
+const TIMEOUT: Duration = Duration::from_secs(300);
+
+const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The machine that `firmware-example/memory.x` describes, with a clock that advances by a fixed
+/// time an instruction.
+const QEMU: &str = "qemu-system-arm";
+const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 \
+    -icount shift=10,align=off,sleep=off \
+    -nographic -monitor none -serial none \
+    -semihosting-config enable=on,target=native -kernel";
+
+/// The built programs of `firmware-example`.
+pub struct Firmware {
+    programs: PathBuf,
+    /// The compiler they were built with.
+    pub compiler: String,
+}
+
+/// The folder of the package.
+#[must_use]
+pub fn directory() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware-example")
+}
+
+/// Builds all programs in release.
+///
+/// # Errors
+/// [`Missing`] if there is no compiler for the target.
+///
+/// # Panics
+/// If the programs do not compile.
+pub fn build() -> Result<Firmware, Missing> {
+    let target_dir = directory().join("target");
+    let output = Command::new(directory().join("../scripts/thumb-cargo.sh"))
+        .args(["build", "--release", "--locked", "--bins"])
+        .args(["--target", TARGET, "--target-dir"])
+        .arg(&target_dir)
+        .current_dir(directory())
+        .output()
+        .unwrap_or_else(|error| panic!("scripts/thumb-cargo.sh: {error}"));
+    let messages = String::from_utf8_lossy(&output.stderr);
+    if output.status.code() == Some(NO_COMPILER) {
+        return Err(Missing(messages.into_owned()));
+    }
+    assert!(output.status.success(), "the firmware:\n{messages}");
+    let compiler = messages
+        .lines()
+        .find_map(|line| line.strip_prefix("thumb-cargo: compiler: "))
+        .unwrap_or_else(|| panic!("no compiler named in:\n{messages}"));
+    Ok(Firmware {
+        programs: target_dir.join(TARGET).join("release"),
+        compiler: compiler.to_owned(),
+    })
+}
+
+impl Firmware {
+    /// Runs a program to its end and returns the lines it logged.
+    ///
+    /// # Errors
+    /// [`Missing`] if there is no QEMU.
+    ///
+    /// # Panics
+    /// If the program fails, or does not end.
+    pub fn run(&self, program: &str) -> Result<Vec<String>, Missing> {
+        let mut lines = Vec::new();
+        let status = run(&self.programs.join(program), |line| lines.push(line))?;
+        let text = lines.join("\n");
+        let status =
+            status.unwrap_or_else(|error| panic!("{program}: {error}; it logged:\n{text}"));
+        assert!(status.success(), "{program}: {status}; it logged:\n{text}");
+        Ok(lines)
+    }
+}
+
+/// Runs the program in an ELF file under QEMU, handing over each line it logs. Returns how it
+/// ended.
+///
+/// # Errors
+/// [`Missing`] if there is no QEMU; inside, whatever went wrong with the file, its log or QEMU.
+pub fn run(elf: &Path, line: impl FnMut(String)) -> Result<io::Result<ExitStatus>, Missing> {
+    let child = Command::new(QEMU)
+        .args(QEMU_ARGUMENTS.split_whitespace())
+        .arg(elf)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn();
+    match child {
+        Ok(mut child) => {
+            let result = follow(elf, &mut child, line);
+            if result.is_err() {
+                // It may have ended by itself; nothing is left to do about it then.
+                let _ = child.kill();
+                let _ = child.wait();
+            }
+            Ok(result)
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Err(Missing(format!(
+            "no {QEMU} here; on Debian: apt-get install --no-install-recommends {QEMU}"
+        ))),
+        Err(error) => Ok(Err(error)),
+    }
+}
+
+/// Decodes the log of the running program until it ends.
+fn follow(elf: &Path, child: &mut Child, mut line: impl FnMut(String)) -> io::Result<ExitStatus> {
+    let table = Table::parse(&fs::read(elf)?).map_err(io::Error::other)?;
+    let table = table.ok_or_else(|| io::Error::other("the program holds no log formats"))?;
+    let mut decoder = table.new_stream_decoder();
+    let mut output = child.stdout.take().expect("stdout is a pipe");
+    let (sender, chunks) = mpsc::channel();
+    thread::spawn(move || {
+        let mut chunk = [0; 4096];
+        while let Ok(length @ 1..) = output.read(&mut chunk) {
+            if sender.send(chunk[..length].to_vec()).is_err() {
+                break;
+            }
+        }
+    });
+    let end = Instant::now() + TIMEOUT;
+    let overdue = || io::Error::new(io::ErrorKind::TimedOut, "it did not end in time");
+    loop {
+        match chunks.recv_timeout(end.saturating_duration_since(Instant::now())) {
+            Ok(chunk) => decoder.received(&chunk),
+            Err(mpsc::RecvTimeoutError::Disconnected) => return child.wait(),
+            Err(mpsc::RecvTimeoutError::Timeout) => return Err(overdue()),
+        }
+        loop {
+            match decoder.decode() {
+                Ok(frame) => line(frame.display_message().to_string()),
+                Err(DecodeError::UnexpectedEof) => break,
+                Err(DecodeError::Malformed) => return Err(io::Error::other("a malformed log")),
+            }
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! Reading recorded structure counts.
+
+use minimal_surprise_sim::structures::{Structure, Structures};
+use minimal_surprise_sim::{Grid, Pose};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// A line of the file.
+#[derive(Deserialize)]
+struct StateLine {
+    grid: (u32, u32),
+    robots: Vec<Pose>,
+    source: String,
+    structures: StructuresLine,
+}
+
+#[derive(Deserialize)]
+struct StructuresLine {
+    line: LineLine,
+    pair: u64,
+    square: u64,
+    triangular_lattice: u64,
+    random_dispersion: u64,
+    cluster: ClusterLine,
+}
+
+#[derive(Deserialize)]
+struct LineLine {
+    robots: u64,
+    horizontal: u64,
+    vertical: u64,
+    spanning: u64,
+}
+
+#[derive(Deserialize)]
+struct ClusterLine {
+    robots: u64,
+    clusters: u64,
+    connections: u64,
+    verdict: String,
+}
+
+/// Everything that is counted in a state.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Counts {
+    /// Robots in lines.
+    pub line_robots: u64,
+    /// Lines from west to east.
+    pub horizontal: u64,
+    /// Lines from south to north.
+    pub vertical: u64,
+    /// Lines around the torus.
+    pub spanning: u64,
+    /// Robots in pairs.
+    pub pair: u64,
+    /// Robots in squares.
+    pub square: u64,
+    /// Robots in triangular lattices.
+    pub triangular_lattice: u64,
+    /// Robots randomly dispersed.
+    pub random_dispersion: u64,
+    /// Robots in clusters.
+    pub cluster_robots: u64,
+    /// Clusters.
+    pub clusters: u64,
+    /// Connected pairs of clusters.
+    pub connections: u64,
+    /// What the clusters amount to; without clusters, clustering.
+    pub verdict: Structure,
+}
+
+impl Counts {
+    /// The counts that the library gives.
+    #[must_use]
+    pub fn of(structures: &Structures) -> Self {
+        let count = |structure| u64::from(structures.count(structure));
+        let (lines, clusters) = (structures.line_counts(), structures.clusters());
+        Self {
+            line_robots: count(Structure::Line),
+            horizontal: lines.horizontal.into(),
+            vertical: lines.vertical.into(),
+            spanning: lines.spanning.into(),
+            pair: count(Structure::Pair),
+            square: count(Structure::Square),
+            triangular_lattice: count(Structure::TriangularLattice),
+            random_dispersion: count(Structure::RandomDispersion),
+            cluster_robots: clusters.robots().len() as u64,
+            clusters: clusters.clusters().len() as u64,
+            connections: clusters.connections(),
+            verdict: clusters
+                .grouping()
+                .map_or(Structure::Clustering, Structure::from),
+        }
+    }
+
+    /// Every count and the verdict, in one order, by name.
+    #[must_use]
+    pub fn named(&self) -> [(&'static str, u64); 12] {
+        [
+            ("robots in lines", self.line_robots),
+            ("horizontal lines", self.horizontal),
+            ("vertical lines", self.vertical),
+            ("spanning lines", self.spanning),
+            ("pair", self.pair),
+            ("square", self.square),
+            ("triangular lattice", self.triangular_lattice),
+            ("random dispersion", self.random_dispersion),
+            ("robots in clusters", self.cluster_robots),
+            ("clusters", self.clusters),
+            ("connections", self.connections),
+            ("verdict", self.verdict as u64),
+        ]
+    }
+}
+
+/// A recorded state.
+pub struct State {
+    /// Line of the file, from 1.
+    pub line: usize,
+    /// Where the state comes from.
+    pub source: String,
+    /// The grid.
+    pub grid: Grid,
+    /// The swarm.
+    pub poses: Vec<Pose>,
+    /// What the authors' scripts counted.
+    pub recorded: Counts,
+}
+
+/// The file of the states: `STRUCTURES_FILE`, or the project's own copy.
+#[must_use]
+pub fn file() -> PathBuf {
+    std::env::var_os("STRUCTURES_FILE").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/structures/states.jsonl"),
+        PathBuf::from,
+    )
+}
+
+/// All states, in the order of the file.
+///
+/// # Panics
+/// If the file cannot be read.
+#[must_use]
+pub fn states() -> Vec<State> {
+    let path = file();
+    let text = std::fs::read_to_string(&path)
+        .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let states: Vec<State> = (1..)
+        .zip(text.lines())
+        .filter(|(_, text)| !text.trim().is_empty())
+        .map(|(line, text)| {
+            read(line, text).unwrap_or_else(|error| panic!("{}:{line}: {error}", path.display()))
+        })
+        .collect();
+    assert!(!states.is_empty(), "no state in {}", path.display());
+    states
+}
+
+fn read(line: usize, text: &str) -> Result<State, String> {
+    let state: StateLine = serde_json::from_str(text).map_err(|error| error.to_string())?;
+    let StructuresLine {
+        line: lines,
+        cluster,
+        ..
+    } = &state.structures;
+    let verdict = match cluster.verdict.as_str() {
+        "Aggregation" => Structure::Aggregation,
+        "Loosely Grouped" => Structure::LooseGrouping,
+        "Clusters" => Structure::Clustering,
+        other => return Err(format!("verdict {other:?}")),
+    };
+    Ok(State {
+        line,
+        grid: Grid::new(state.grid.0, state.grid.1).map_err(|error| error.to_string())?,
+        recorded: Counts {
+            line_robots: lines.robots,
+            horizontal: lines.horizontal,
+            vertical: lines.vertical,
+            spanning: lines.spanning,
+            pair: state.structures.pair,
+            square: state.structures.square,
+            triangular_lattice: state.structures.triangular_lattice,
+            random_dispersion: state.structures.random_dispersion,
+            cluster_robots: cluster.robots,
+            clusters: cluster.clusters,
+            connections: cluster.connections,
+            verdict,
+        },
+        poses: state.robots,
+        source: state.source,
+    })
+}

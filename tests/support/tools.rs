@@ -1,0 +1,30 @@
+//! Tools that a test needs and a machine may lack.
+
+use std::fmt;
+
+/// A tool is not there; says what to install.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Missing(pub String);
+
+impl fmt::Display for Missing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// The tool, or `None` after saying that the test is skipped.
+///
+/// # Panics
+/// If the tool is missing and the environment has `CI=true`: there, a skipped test would pass
+/// unseen.
+#[must_use]
+pub fn require<T>(tool: Result<T, Missing>) -> Option<T> {
+    match tool {
+        Ok(tool) => Some(tool),
+        Err(missing) if std::env::var("CI").as_deref() == Ok("true") => panic!("{missing}"),
+        Err(missing) => {
+            println!("SKIPPED: {missing}");
+            None
+        }
+    }
+}
