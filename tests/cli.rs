@@ -63,7 +63,11 @@ fn an_evolution_ends_with_a_picture_a_hash_and_a_genome_and_can_be_repeated_from
     let evolver = Evolver::in_empty_folder();
     let first = evolver.run(&short(&["--out", "first"]));
     assert_eq!(first.code, Some(0), "{first:?}");
-    let arrows = first.stdout.chars().filter(|c| "▶▲◀▼▷△◁▽".contains(*c)).count();
+    let arrows = first
+        .stdout
+        .chars()
+        .filter(|c| "▶▲◀▼▷△◁▽".contains(*c))
+        .count();
     assert_eq!(arrows, 12);
     let seed = first.stdout.lines().next().unwrap();
     let seed = seed.split_whitespace().nth(1).unwrap();

@@ -56,7 +56,7 @@ impl Drop for Replay {
 
 /// Uniform enough for a test, below `end`.
 fn below(rng: &mut ChaCha8Rng, end: usize) -> usize {
-    (u64::from(rng.next_u32()) * end as u64 >> 32) as usize
+    ((u64::from(rng.next_u32()) * end as u64) >> 32) as usize
 }
 
 fn percent(rng: &mut ChaCha8Rng, share: usize) -> bool {
@@ -589,7 +589,8 @@ fn a_robot_that_was_restarted_says_so_and_a_session_that_ended_stays_ended() {
         ..reply(1, Reply::Done)
     });
     for _ in 0..3 {
-        assert_eq!(feed(&mut server, &mut handler, &start), [done.clone()]);
+        let answers = feed(&mut server, &mut handler, &start);
+        assert_eq!(answers, std::slice::from_ref(&done));
     }
     assert_eq!(handler.calls, 3);
 }
