@@ -233,8 +233,9 @@ fn fuzzed_frames_are_accepted_if_and_only_if_they_are_frames() {
     let (mut server, mut handler) = (Server::new(), Recorder::default());
     // What has arrived since the last zero.
     let mut stretch = Vec::new();
-    // Messages that may arrive whole: those of the last three frames, and what was made of them.
-    let mut known: VecDeque<Vec<u8>> = VecDeque::from(vec![vec![]; 6]);
+    // Messages that may arrive whole: those of the last eight frames, and what was made of
+    // them. A frame that has lost its end waits until the next zero.
+    let mut known: VecDeque<Vec<u8>> = VecDeque::from(vec![vec![]; 16]);
     let mut earlier = Vec::new();
     let (mut accepted, mut well_formed) = (0_u64, 0_u64);
     for number in 0..frames {
