@@ -95,10 +95,20 @@ for target in $targets; do
     done
 done
 
+say 'slots and link for the Cortex-M4'
+for features in '' minimal-surprise-slots/defmt,minimal-surprise-link/defmt; do
+    scripts/thumb-cargo.sh build --locked --release --package minimal-surprise-slots \
+        --package minimal-surprise-link --features "$features" --target thumbv7em-none-eabihf
+done
+
 say 'packages'
 cargo package --locked --workspace --exclude tests --allow-dirty --no-verify
 
 say 'tests'
 cargo test --locked --workspace --all-features -- --show-output
+if [ -n "${TEST_ALL:-}" ]; then
+    say 'every power cut after every power cut'
+    cargo test --locked --release --package tests --test power_cuts -- --show-output
+fi
 
 say 'everything passed'

@@ -5,9 +5,10 @@ use crate::genome::Genome;
 use crate::network::{ActionNetwork, MAX_HIDDEN, PredictionNetwork};
 use crate::sensor::SensorBits;
 use crate::topology::Topology;
+use serde::{Deserialize, Serialize};
 
 /// What a robot does in a step. There is no stopping.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Action {
     /// One cell ahead, if it is free. Action value 0.
@@ -18,7 +19,7 @@ pub enum Action {
 }
 
 /// Which way a robot turns; decided in every step, carried out with [`Action::Turn`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Turn {
     /// To the left.
@@ -29,7 +30,7 @@ pub enum Turn {
 }
 
 /// What one step decides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decision {
     /// What to do.
@@ -62,7 +63,7 @@ pub struct State {
 /// Bits that a robot mispredicted, of all that it sensed.
 ///
 /// One minus their ratio, over all robots, is the fitness of Eq. 1 of the paper.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Surprise {
     /// Bits that were not as predicted.
@@ -94,6 +95,12 @@ impl Controller {
     #[must_use]
     pub fn from_encoded(genome: &EncodedGenome<'_>) -> Self {
         Self::build(genome.topology(), &mut genome.weights())
+    }
+
+    /// The controller of a genome whose weights are all zero: it turns clockwise in every step.
+    #[must_use]
+    pub fn zeroed(topology: Topology) -> Self {
+        Self::build(topology, &mut core::iter::empty())
     }
 
     fn build(topology: Topology, weights: &mut impl Iterator<Item = i16>) -> Self {
@@ -255,6 +262,16 @@ mod tests {
         assert_eq!(spread(0b101, 0b0011_0110), 0b0001_0010);
         assert_eq!(spread(0xffff, 0x3fff), 0x3fff);
         assert_eq!(spread(0xffff, 0), 0);
+    }
+
+    #[test]
+    fn a_zeroed_controller_is_that_of_a_zeroed_genome_and_only_turns() {
+        for topology in Topology::ALL {
+            let controller = Controller::zeroed(topology);
+            assert_eq!(controller, Controller::new(&Genome::zeroed(topology)));
+            let decided = controller.decide(SensorBits::NONE, Action::Straight);
+            assert_eq!(decided, (Action::Turn, Turn::Clockwise));
+        }
     }
 
     #[test]

@@ -93,7 +93,7 @@ impl SensorModel {
 }
 
 /// One bit a sensor: bit k is sensor k, 1 means occupied.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SensorBits(u16);
 

@@ -1,7 +1,10 @@
 //! What the integration tests share.
 
 pub mod firmware;
+pub mod flash;
+pub mod full;
 pub mod golden;
+pub mod link_robot;
 pub mod program;
 pub mod structures;
 pub mod tools;

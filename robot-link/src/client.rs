@@ -1,0 +1,179 @@
+//! The host's end of the line.
+
+use crate::frame::{Decoder, LineErrors, WIRE_BYTES_MAX, count, encode};
+use crate::message::{
+    CHUNK_BYTES_MAX, Direction, Envelope, MalformedMessage, PROTOCOL_VERSION, Reply, Request,
+    decode_reply,
+};
+
+/// The host's end: one request at a time, and the reply that belongs to it.
+///
+/// It knows no clock: whoever waits calls [`Client::timed_out`].
+#[derive(Debug)]
+pub struct Client {
+    decoder: Decoder,
+    session: u32,
+    /// Number of the next request; none after 2³².
+    next: Option<u32>,
+    /// Number of the request that waits for its reply, and how often it was sent.
+    pending: Option<(u32, u32)>,
+    attempts_max: u32,
+    wire: [u8; WIRE_BYTES_MAX],
+    length: usize,
+    strays: u32,
+    last_malformed: Option<MalformedMessage>,
+}
+
+/// This request cannot be sent, or not now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RequestError {
+    /// The last one has neither been answered nor given up.
+    #[error("the robot has not answered the last request yet")]
+    Pending,
+    /// A session begins with [`Request::Identify`].
+    #[error("the first request of a session is to identify")]
+    IdentifyFirst,
+    /// The chunk has more than [`CHUNK_BYTES_MAX`] bytes.
+    #[error("a chunk of {found} bytes; at most {CHUNK_BYTES_MAX} go into a request")]
+    ChunkTooLong {
+        /// Bytes of the chunk.
+        found: usize,
+    },
+    /// All 2³² numbers are used; open another session.
+    #[error("no number is left for a request; open another session")]
+    SessionExhausted,
+}
+
+/// The robot has not answered. Whether it carried the request out is not known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no answer to a request sent {attempts} times")]
+pub struct GaveUp {
+    /// How often the request was sent.
+    pub attempts: u32,
+}
+
+impl Client {
+    /// How often a request is sent unless told otherwise.
+    pub const ATTEMPTS_MAX: u32 = 5;
+
+    /// A new session; its number must not have been used on this line before: take a random one.
+    /// A request is sent at most `attempts_max` times, and at least once.
+    #[must_use]
+    pub const fn new(session: u32, attempts_max: u32) -> Self {
+        Self {
+            decoder: Decoder::new(),
+            session,
+            next: Some(0),
+            pending: None,
+            attempts_max,
+            wire: [0; WIRE_BYTES_MAX],
+            length: 0,
+            strays: 0,
+            last_malformed: None,
+        }
+    }
+
+    /// The bytes to send for a request. Wait [`Request::timeout_ms`] for the reply.
+    ///
+    /// # Errors
+    /// [`RequestError`]; nothing is to be sent then.
+    pub fn request(&mut self, request: &Request<'_>) -> Result<&[u8], RequestError> {
+        if self.pending.is_some() {
+            return Err(RequestError::Pending);
+        }
+        let sequence = self.next.ok_or(RequestError::SessionExhausted)?;
+        if sequence == 0 && *request != Request::Identify {
+            return Err(RequestError::IdentifyFirst);
+        }
+        let found = match request {
+            Request::Chunk { data, .. } => data.len(),
+            _ => 0,
+        };
+        let too_long = RequestError::ChunkTooLong { found };
+        if found > CHUNK_BYTES_MAX {
+            return Err(too_long);
+        }
+        let envelope = Envelope {
+            version: PROTOCOL_VERSION,
+            direction: Direction::Request,
+            session: self.session,
+            sequence,
+            body: *request,
+        };
+        self.length = encode(&envelope, &mut self.wire).map_err(|_| too_long)?;
+        self.next = sequence.checked_add(1);
+        self.pending = Some((sequence, 1));
+        Ok(self.frame())
+    }
+
+    /// Takes one byte from the line; gives the reply to the pending request if that completes it.
+    /// All else that arrives is counted and dropped.
+    pub fn feed(&mut self, byte: u8) -> Option<Reply<'_>> {
+        if !self.decoder.feed(byte) {
+            return None;
+        }
+        let pending = self.pending.map(|(sequence, _)| sequence);
+        match decode_reply(self.decoder.payload()) {
+            Ok(reply) if reply.session == self.session && Some(reply.sequence) == pending => {
+                self.pending = None;
+                Some(reply.body)
+            }
+            Ok(_) => {
+                count(&mut self.strays);
+                None
+            }
+            Err(malformed) => {
+                count(&mut self.strays);
+                self.last_malformed = Some(malformed);
+                None
+            }
+        }
+    }
+
+    /// The reply has not come in time: the bytes to send again.
+    ///
+    /// # Errors
+    /// [`GaveUp`] if that was the last attempt, or nothing was pending; another request may follow.
+    pub fn timed_out(&mut self) -> Result<&[u8], GaveUp> {
+        match self.pending {
+            Some((sequence, attempts)) if attempts < self.attempts_max => {
+                self.pending = Some((sequence, attempts + 1));
+                Ok(self.frame())
+            }
+            pending => {
+                self.pending = None;
+                let attempts = pending.map_or(0, |(_, attempts)| attempts);
+                Err(GaveUp { attempts })
+            }
+        }
+    }
+
+    /// Whether a request waits for its reply.
+    #[must_use]
+    pub fn is_pending(&self) -> bool {
+        self.pending.is_some()
+    }
+
+    /// Frames that arrived and were not the reply to the pending request.
+    #[must_use]
+    pub fn strays(&self) -> u32 {
+        self.strays
+    }
+
+    /// Why the last frame that was no message of this protocol was none; tells another device, or
+    /// another version, from silence.
+    #[must_use]
+    pub fn last_malformed(&self) -> Option<MalformedMessage> {
+        self.last_malformed
+    }
+
+    /// What arrived that was no frame.
+    #[must_use]
+    pub fn errors(&self) -> LineErrors {
+        self.decoder.errors()
+    }
+
+    fn frame(&self) -> &[u8] {
+        self.wire.get(..self.length).unwrap_or(&[])
+    }
+}

@@ -1,0 +1,177 @@
+//! Frames: `00`, COBS of message and CRC-32C, `00`.
+
+use cobs::{CobsEncoder, DecodeResult, DecoderState};
+use minimal_surprise_controller::codec::CRC_32C;
+use serde::Serialize;
+
+/// Most bytes of a message.
+pub const PAYLOAD_BYTES_MAX: usize = 146;
+/// Bytes of the CRC-32C behind the message, little-endian.
+const CRC_BYTES: usize = 4;
+/// Most bytes of a frame before COBS.
+pub const FRAME_BYTES_MAX: usize = PAYLOAD_BYTES_MAX + CRC_BYTES;
+/// Most bytes of a frame on the line: a zero before it, one byte of COBS, a zero behind it.
+pub const WIRE_BYTES_MAX: usize = FRAME_BYTES_MAX + 3;
+
+// One byte of overhead is enough for so few.
+const _: () = assert!(FRAME_BYTES_MAX < 254);
+
+/// The message does not fit a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[error("a message of more than {PAYLOAD_BYTES_MAX} bytes")]
+pub struct EncodeError;
+
+/// Writes a message as a frame to `wire` and says how many bytes that took.
+///
+/// # Errors
+/// [`EncodeError`] if the message or the frame does not fit.
+pub fn encode(message: &impl Serialize, wire: &mut [u8]) -> Result<usize, EncodeError> {
+    let mut frame = [0; FRAME_BYTES_MAX];
+    let payload = frame.get_mut(..PAYLOAD_BYTES_MAX).ok_or(EncodeError)?;
+    let payload = postcard::to_slice(message, payload).map_err(|_| EncodeError)?;
+    let crc = CRC_32C.checksum(payload).to_le_bytes();
+    let (first, rest) = wire.split_first_mut().ok_or(EncodeError)?;
+    let mut encoder = CobsEncoder::new(rest);
+    encoder.push(payload).map_err(|_| EncodeError)?;
+    encoder.push(&crc).map_err(|_| EncodeError)?;
+    let length = encoder.finalize();
+    *first = 0;
+    *rest.get_mut(length).ok_or(EncodeError)? = 0;
+    Ok(length + 2)
+}
+
+/// What has arrived that was no frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct LineErrors {
+    /// Frames with a wrong CRC.
+    pub bad_crc: u32,
+    /// Bytes between two zero bytes that are no frame: broken, cut off or too long.
+    pub no_frame: u32,
+}
+
+/// Finds frames in a stream of bytes, of which any may be missing, wrong or too many.
+#[derive(Debug)]
+pub struct Decoder {
+    cobs: DecoderState,
+    bytes: [u8; FRAME_BYTES_MAX],
+    length: usize,
+    too_long: bool,
+    complete: bool,
+    errors: LineErrors,
+}
+
+impl Decoder {
+    /// One that has seen nothing.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            cobs: DecoderState::Idle,
+            bytes: [0; FRAME_BYTES_MAX],
+            length: 0,
+            too_long: false,
+            complete: false,
+            errors: LineErrors {
+                bad_crc: 0,
+                no_frame: 0,
+            },
+        }
+    }
+
+    /// Takes one byte; says whether it completed a frame with the right CRC. Its message is in
+    /// [`Decoder::payload`] until the next byte is fed.
+    pub fn feed(&mut self, byte: u8) -> bool {
+        if self.complete {
+            self.start_over();
+        }
+        match self.cobs.feed(byte) {
+            Ok(DecodeResult::NoData) => false,
+            Ok(DecodeResult::DataContinue(byte)) => {
+                match self.bytes.get_mut(self.length) {
+                    Some(place) => {
+                        *place = byte;
+                        self.length += 1;
+                    }
+                    None => self.too_long = true,
+                }
+                false
+            }
+            Ok(DecodeResult::DataComplete) => {
+                self.complete = self.check();
+                if !self.complete {
+                    self.start_over();
+                }
+                self.complete
+            }
+            Err(_) => {
+                count(&mut self.errors.no_frame);
+                self.start_over();
+                false
+            }
+        }
+    }
+
+    /// The message of the frame that the last byte completed; empty if it completed none.
+    #[must_use]
+    pub fn payload(&self) -> &[u8] {
+        match self.frame() {
+            Some((payload, _)) if self.complete => payload,
+            _ => &[],
+        }
+    }
+
+    /// Its CRC; 0 if there is none.
+    #[must_use]
+    pub fn crc(&self) -> u32 {
+        match self.frame() {
+            Some((_, crc)) if self.complete => crc,
+            _ => 0,
+        }
+    }
+
+    /// What was no frame so far.
+    #[must_use]
+    pub fn errors(&self) -> LineErrors {
+        self.errors
+    }
+
+    /// Message and CRC.
+    fn frame(&self) -> Option<(&[u8], u32)> {
+        let (payload, crc) = self.bytes.get(..self.length)?.split_last_chunk()?;
+        Some((payload, u32::from_le_bytes(*crc)))
+    }
+
+    fn check(&mut self) -> bool {
+        match self.frame() {
+            Some((payload, crc)) if !self.too_long && !payload.is_empty() => {
+                let good = CRC_32C.checksum(payload) == crc;
+                if !good {
+                    count(&mut self.errors.bad_crc);
+                }
+                good
+            }
+            _ => {
+                count(&mut self.errors.no_frame);
+                false
+            }
+        }
+    }
+
+    fn start_over(&mut self) {
+        self.length = 0;
+        self.too_long = false;
+        self.complete = false;
+    }
+}
+
+impl Default for Decoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// One more, unless there is no larger number.
+pub(crate) fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
+}

@@ -1,0 +1,259 @@
+//! The robot's end of the line.
+
+use crate::frame::{Decoder, WIRE_BYTES_MAX, count, encode};
+use crate::message::{
+    Direction, Envelope, FIRMWARE_BYTES_MAX, Identity, LineCounters, PROTOCOL_VERSION, Refusal,
+    Reply, Report, Request, Stepped, VERSION_BYTES_MAX, decode_request,
+};
+use minimal_surprise_controller::SensorBits;
+
+/// What the robot does when it is asked. Each function is called once for a request, however often
+/// that arrives. What is refused has changed nothing, unless the [`Refusal`] says so.
+pub trait Handler {
+    /// Says who the robot is and what it runs.
+    fn identify(&mut self) -> Identity<'_>;
+
+    /// Prepares to receive a container of `length` bytes whose last four are `crc`, little-endian.
+    ///
+    /// # Errors
+    /// [`Refusal::Running`], [`Refusal::ImpossibleLength`], [`Refusal::Flash`].
+    fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal>;
+
+    /// Takes the next bytes of the container.
+    ///
+    /// # Errors
+    /// [`Refusal::NotBegun`], [`Refusal::WrongOffset`], [`Refusal::OtherLength`],
+    /// [`Refusal::Flash`].
+    fn chunk(&mut self, offset: u16, data: &[u8]) -> Result<(), Refusal>;
+
+    /// Checks the genome and puts it in use; says the write count.
+    ///
+    /// # Errors
+    /// [`Refusal::NotBegun`], [`Refusal::OtherLength`], [`Refusal::BadGenome`],
+    /// [`Refusal::Flash`].
+    fn commit(&mut self) -> Result<u32, Refusal>;
+
+    /// One control step with these readings, without moving.
+    ///
+    /// # Errors
+    /// [`Refusal::Running`].
+    fn step(&mut self, sensors: SensorBits) -> Result<Stepped, Refusal>;
+
+    /// Forgets the past.
+    ///
+    /// # Errors
+    /// [`Refusal::Running`].
+    fn reset(&mut self) -> Result<(), Refusal>;
+
+    /// Starts the control loop; a robot that runs goes on.
+    ///
+    /// # Errors
+    /// [`Refusal::Unsupported`].
+    fn start(&mut self) -> Result<(), Refusal>;
+
+    /// Stops motors and control loop; a robot that stands goes on standing.
+    ///
+    /// # Errors
+    /// [`Refusal::Unsupported`].
+    fn stop(&mut self) -> Result<(), Refusal>;
+
+    /// Says how it is going.
+    fn telemetry(&mut self) -> Report;
+}
+
+/// The robot's end: takes bytes, gives bytes, and sees to it that every request is carried out once.
+#[derive(Debug)]
+pub struct Server {
+    decoder: Decoder,
+    conversation: Conversation,
+}
+
+/// Who talks to the robot, and what was said last.
+#[derive(Debug)]
+struct Conversation {
+    session: Option<u32>,
+    /// The one before; it cannot come back.
+    session_before: Option<u32>,
+    /// The last request carried out: its number and the CRC of its frame.
+    last: (u32, u32),
+    /// The answer to it, as it was sent.
+    reply: Wire<WIRE_BYTES_MAX>,
+    /// The answer to a request of no open session.
+    no_session: Wire<24>,
+    counters: LineCounters,
+}
+
+/// A frame to send.
+#[derive(Debug)]
+struct Wire<const N: usize> {
+    bytes: [u8; N],
+    length: usize,
+}
+
+/// Which of the two answers to send.
+enum Answer {
+    Reply,
+    NoSession,
+}
+
+impl Server {
+    /// One that nobody has talked to.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            decoder: Decoder::new(),
+            conversation: Conversation {
+                session: None,
+                session_before: None,
+                last: (0, 0),
+                reply: Wire::new(),
+                no_session: Wire::new(),
+                counters: LineCounters {
+                    accepted: 0,
+                    repeated: 0,
+                    stale: 0,
+                    malformed: 0,
+                    bad_crc: 0,
+                    no_frame: 0,
+                },
+            },
+        }
+    }
+
+    /// Takes one byte from the line. If it completes a request, that is carried out, and the bytes
+    /// to send are returned.
+    pub fn feed(&mut self, byte: u8, handler: &mut impl Handler) -> Option<&[u8]> {
+        if !self.decoder.feed(byte) {
+            return None;
+        }
+        let line = self.counters();
+        let conversation = &mut self.conversation;
+        let Ok(request) = decode_request(self.decoder.payload()) else {
+            count(&mut conversation.counters.malformed);
+            return None;
+        };
+        match conversation.answer(&request, self.decoder.crc(), line, handler)? {
+            Answer::Reply => conversation.reply.get(),
+            Answer::NoSession => conversation.no_session.get(),
+        }
+    }
+
+    /// What has arrived so far.
+    #[must_use]
+    pub fn counters(&self) -> LineCounters {
+        let errors = self.decoder.errors();
+        LineCounters {
+            bad_crc: errors.bad_crc,
+            no_frame: errors.no_frame,
+            ..self.conversation.counters
+        }
+    }
+}
+
+impl Default for Server {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Conversation {
+    fn answer(
+        &mut self,
+        request: &Envelope<Request<'_>>,
+        crc: u32,
+        line: LineCounters,
+        handler: &mut impl Handler,
+    ) -> Option<Answer> {
+        let Envelope {
+            session, sequence, ..
+        } = *request;
+        if self.session != Some(session) {
+            // Number 0 is always an identification.
+            if sequence > 0 || self.session_before == Some(session) {
+                count(&mut self.counters.stale);
+                let refused = Reply::Refused(Refusal::NoSession);
+                self.no_session.put(session, sequence, refused);
+                return Some(Answer::NoSession);
+            }
+            self.session_before = self.session;
+            self.session = Some(session);
+        } else if sequence == self.last.0 && crc == self.last.1 {
+            count(&mut self.counters.repeated);
+            return Some(Answer::Reply);
+        } else if sequence <= self.last.0 {
+            count(&mut self.counters.stale);
+            return None;
+        }
+        self.last = (sequence, crc);
+        count(&mut self.counters.accepted);
+        let line = LineCounters {
+            accepted: self.counters.accepted,
+            ..line
+        };
+        let reply = carry_out(&request.body, line, handler);
+        self.reply.put(session, sequence, reply);
+        Some(Answer::Reply)
+    }
+}
+
+fn carry_out<'h>(
+    request: &Request<'_>,
+    line: LineCounters,
+    handler: &'h mut impl Handler,
+) -> Reply<'h> {
+    let done = |()| Reply::Done;
+    let reply = match *request {
+        Request::Identify => {
+            let identity = handler.identify();
+            return Reply::Identity(Identity {
+                firmware: front(identity.firmware, FIRMWARE_BYTES_MAX),
+                version: front(identity.version, VERSION_BYTES_MAX),
+                ..identity
+            });
+        }
+        Request::Begin { length, crc } => handler.begin(length, crc).map(done),
+        Request::Chunk { offset, data } => handler.chunk(offset, data).map(done),
+        Request::Commit => handler
+            .commit()
+            .map(|write_count| Reply::Committed { write_count }),
+        Request::Step { sensors } => handler.step(sensors).map(Reply::Stepped),
+        Request::Reset => handler.reset().map(done),
+        Request::Start => handler.start().map(done),
+        Request::Stop => handler.stop().map(done),
+        Request::Telemetry => {
+            let report = handler.telemetry();
+            Ok(Reply::Telemetry { report, line })
+        }
+    };
+    reply.unwrap_or_else(Reply::Refused)
+}
+
+/// The first bytes of a text, at most `max`, whole characters.
+fn front(text: &str, max: usize) -> &str {
+    text.get(..text.floor_char_boundary(max)).unwrap_or("")
+}
+
+impl<const N: usize> Wire<N> {
+    const fn new() -> Self {
+        Self {
+            bytes: [0; N],
+            length: 0,
+        }
+    }
+
+    fn put(&mut self, session: u32, sequence: u32, body: Reply<'_>) {
+        let envelope = Envelope {
+            version: PROTOCOL_VERSION,
+            direction: Direction::Reply,
+            session,
+            sequence,
+            body,
+        };
+        // Every reply fits: the texts are cut to length, all else has a largest size.
+        self.length = encode(&envelope, &mut self.bytes).unwrap_or(0);
+    }
+
+    fn get(&self) -> Option<&[u8]> {
+        self.bytes.get(..self.length)
+    }
+}

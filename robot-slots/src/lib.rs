@@ -1,0 +1,570 @@
+//! Two genome slots in flash; power may fail at any moment.
+//!
+//! A genome is written to the slot that is not in use, read back, checked, and committed by the
+//! last word written. Until then the slot in use is not touched; from then on the new one wins.
+//!
+//! ```text
+//! one slot: whole erase units, at least 1376 bytes
+//!  0   16  header: "MSS1", write count, container length, container CRC; all u32, little-endian
+//! 32    8  commit record: CRC-32C of the header's 16 bytes, and its complement
+//! 64    n  genome container, which ends with its own CRC-32C
+//! ```
+//!
+//! Each of the three is padded with 0xff to whole words; what is between them stays erased.
+//! `docs/genome-slots.md` has the whole story.
+//!
+//! **Start.** A slot counts if its commit record belongs to its header, and its container decodes
+//! and is the one that the header announces. The larger write count wins. Without any such slot
+//! the robot gets a controller that only turns.
+//!
+//! **Update.** Erase; header; container; read back; commit record; read back. The erase is never
+//! left out: flash whose erase was interrupted can read as erased and yet not be. So no word is
+//! written twice between erases.
+//!
+//! **Stack.** Nothing here keeps a container on the stack: it is read into a [`Buffer`] that the
+//! caller owns, or [`InPlace`].
+#![no_std]
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::indexing_slicing,
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic
+    )
+)]
+
+mod error;
+mod layout;
+mod room;
+
+pub use error::{Defect, PlaceError, UpdateError};
+pub use layout::{
+    BLOCK_BYTES, COMMIT_AT, CONTAINER_AT, Header, MAGIC, ROOM_BYTES, SLOT_BYTES_MIN, slot_bytes,
+};
+pub use room::{Buffer, InPlace, MappedFlash, Room};
+
+use embedded_storage::nor_flash::NorFlash;
+use layout::{Block, ERASED, commit_bytes, header_bytes};
+use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
+use minimal_surprise_controller::{
+    Controller, EncodedGenome, Prediction, SensorModel, Topology, TopologyError,
+};
+
+/// Topology of the built-in controller: model C, everything predicted by the network.
+pub const BUILT_IN_TOPOLOGY: Topology = match Topology::new(SensorModel::C, Prediction::Free) {
+    Ok(topology) => topology,
+    Err(TopologyError::NoSuchTemplate { .. } | TopologyError::NotPartly { .. }) => {
+        panic!("model C exists")
+    }
+};
+
+/// The controller of a robot without a genome: whatever it senses, it turns clockwise on the spot.
+#[must_use]
+pub fn built_in_controller() -> Controller {
+    Controller::zeroed(BUILT_IN_TOPOLOGY)
+}
+
+/// One of the two slots.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Slot {
+    /// The one at the lower address.
+    First,
+    /// The one behind it.
+    Second,
+}
+
+impl Slot {
+    /// Both, in order of their addresses.
+    pub const ALL: [Self; 2] = [Self::First, Self::Second];
+
+    /// The other one.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::First => Self::Second,
+            Self::Second => Self::First,
+        }
+    }
+
+    /// 0 or 1.
+    #[must_use]
+    pub const fn index(self) -> u8 {
+        match self {
+            Self::First => 0,
+            Self::Second => 1,
+        }
+    }
+}
+
+/// What was found in a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SlotState {
+    /// Nothing: header and commit record read as erased.
+    Empty,
+    /// An update that was never committed. Does no harm.
+    Unfinished,
+    /// A genome that was committed. That of the slot in use has been checked.
+    Committed(Header),
+    /// A genome that was committed but cannot be run. A fault.
+    Damaged(Header, Defect),
+    /// The flash reports an error when header and commit record are read. A fault, unless an
+    /// update was interrupted: on chips that correct errors, words half-written cannot be read.
+    Unreadable,
+}
+
+impl SlotState {
+    /// The header of a slot that was committed.
+    fn header(self) -> Option<Header> {
+        match self {
+            Self::Committed(header) | Self::Damaged(header, _) => Some(header),
+            Self::Empty | Self::Unfinished | Self::Unreadable => None,
+        }
+    }
+
+    /// 0 if nothing was committed.
+    fn write_count(self) -> u32 {
+        self.header().map_or(0, |header| header.write_count)
+    }
+}
+
+/// What the robot is to run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum InUse<'a> {
+    /// The newest genome.
+    Slot {
+        /// Where it is.
+        slot: Slot,
+        /// What its header says.
+        header: Header,
+        /// The genome.
+        genome: EncodedGenome<'a>,
+    },
+    /// [`built_in_controller`], for there is no genome. A fault to report.
+    BuiltIn,
+}
+
+impl InUse<'_> {
+    /// The controller to run.
+    #[must_use]
+    pub fn controller(&self) -> Controller {
+        match self {
+            Self::Slot { genome, .. } => Controller::from_encoded(genome),
+            Self::BuiltIn => built_in_controller(),
+        }
+    }
+}
+
+/// An update between its begin and its commit.
+#[derive(Clone, Copy, Debug)]
+struct Update {
+    slot: Slot,
+    header: Header,
+    /// Bytes of the container that have arrived.
+    taken: u16,
+    /// Those that do not fill a block yet; erased beyond.
+    block: Block,
+}
+
+/// Two slots in a flash.
+#[derive(Debug)]
+pub struct Slots<F> {
+    flash: F,
+    offset: u32,
+    states: [SlotState; 2],
+    in_use: Option<(Slot, Header)>,
+    /// The largest write count seen or given.
+    write_count: u32,
+    update: Option<Update>,
+}
+
+impl<F: NorFlash> Slots<F> {
+    /// Bytes of one slot of this chip.
+    pub const SLOT_BYTES: usize = slot_bytes(F::ERASE_SIZE);
+
+    /// Words must divide blocks and erase units; another chip does not compile.
+    const CHIP_FITS: () = assert!(
+        BLOCK_BYTES.is_multiple_of(F::WRITE_SIZE)
+            && BLOCK_BYTES.is_multiple_of(F::READ_SIZE)
+            && F::ERASE_SIZE.is_multiple_of(F::WRITE_SIZE)
+            && F::ERASE_SIZE.is_multiple_of(F::READ_SIZE)
+            && slot_bytes(F::ERASE_SIZE) <= u32::MAX as usize / 2,
+        "read and write sizes must be powers of two up to 32 that divide the erase size"
+    );
+
+    /// Looks for the newest genome in the slots at `offset`, a byte address in `flash`. Writes
+    /// nothing. A flash that cannot be read is no error but a [`SlotState`].
+    ///
+    /// # Errors
+    /// [`PlaceError`] if two slots cannot be there.
+    pub fn open(flash: F, offset: u32, room: &mut impl Room<F>) -> Result<Self, PlaceError> {
+        let () = Self::CHIP_FITS;
+        let erase_size = F::ERASE_SIZE;
+        if !(offset as usize).is_multiple_of(erase_size) {
+            return Err(PlaceError::NotAligned { offset, erase_size });
+        }
+        let capacity = flash.capacity();
+        let needed = u64::from(offset) + 2 * Self::SLOT_BYTES as u64;
+        if needed > capacity.min(u32::MAX as usize) as u64 {
+            return Err(PlaceError::OutOfBounds {
+                offset,
+                slot_bytes: Self::SLOT_BYTES,
+                capacity,
+            });
+        }
+        let mut slots = Self {
+            flash,
+            offset,
+            states: [SlotState::Empty; 2],
+            in_use: None,
+            write_count: 0,
+            update: None,
+        };
+        for slot in Slot::ALL {
+            *slots.state_mut(slot) = slots.read_state(slot);
+        }
+        let [first, second] = slots.states.map(SlotState::write_count);
+        slots.write_count = first.max(second);
+        let newest = if first >= second {
+            Slot::First
+        } else {
+            Slot::Second
+        };
+        for slot in [newest, newest.other()] {
+            if slots.in_use.is_none()
+                && let SlotState::Committed(header) = slots.state(slot)
+            {
+                match slots.check(slot, header, room) {
+                    Ok(()) => slots.in_use = Some((slot, header)),
+                    Err(defect) => *slots.state_mut(slot) = SlotState::Damaged(header, defect),
+                }
+            }
+        }
+        Ok(slots)
+    }
+
+    /// The genome to run, and where it comes from. Reads and checks the container once more.
+    pub fn in_use<'a>(&'a mut self, room: &'a mut impl Room<F>) -> InUse<'a> {
+        let Some((slot, header)) = self.in_use else {
+            return InUse::BuiltIn;
+        };
+        let at = self.address(slot, CONTAINER_AT);
+        match container(&mut self.flash, room, at, header) {
+            Ok(genome) => InUse::Slot {
+                slot,
+                header,
+                genome,
+            },
+            Err(_) => InUse::BuiltIn,
+        }
+    }
+
+    /// The slot in use and its header; `None` if the built-in controller is.
+    #[must_use]
+    pub fn newest(&self) -> Option<(Slot, Header)> {
+        self.in_use
+    }
+
+    /// What was found in a slot, or what has become of it since.
+    #[must_use]
+    pub fn state(&self, slot: Slot) -> SlotState {
+        let [first, second] = self.states;
+        match slot {
+            Slot::First => first,
+            Slot::Second => second,
+        }
+    }
+
+    /// How many genomes have been committed to these slots, as far as the slots can tell: the
+    /// largest write count in them.
+    #[must_use]
+    pub fn write_count(&self) -> u32 {
+        self.write_count
+    }
+
+    /// Gives the flash back.
+    pub fn release(self) -> F {
+        self.flash
+    }
+
+    /// Begins an update: erases the slot that is not in use and writes the header. `crc` is the
+    /// container's last four bytes, little-endian. An update that had begun is over.
+    ///
+    /// The chip may stall for as long as it erases, seconds for large erase units: stop motors
+    /// first.
+    ///
+    /// # Errors
+    /// [`UpdateError::ImpossibleLength`], [`UpdateError::CountExhausted`], [`UpdateError::Flash`].
+    pub fn begin(&mut self, length: u16, crc: u32) -> Result<(), UpdateError<F::Error>> {
+        self.update = None;
+        let found = usize::from(length);
+        if found == 0 || found > CONTAINER_BYTES_MAX {
+            return Err(UpdateError::ImpossibleLength { found });
+        }
+        let write_count = self.write_count.checked_add(1);
+        let header = Header {
+            write_count: write_count.ok_or(UpdateError::CountExhausted)?,
+            length,
+            crc,
+        };
+        let slot = self.slot_to_write();
+        let from = self.address(slot, 0);
+        let to = self.address(slot, Self::SLOT_BYTES as u32);
+        *self.state_mut(slot) = SlotState::Unfinished;
+        self.flash.erase(from, to).map_err(UpdateError::Flash)?;
+        self.write_block(from, &header.to_block(), header_bytes(F::WRITE_SIZE))?;
+        self.update = Some(Update {
+            slot,
+            header,
+            taken: 0,
+            block: ERASED,
+        });
+        Ok(())
+    }
+
+    /// Takes the next bytes of the container; `offset` says how many came before.
+    ///
+    /// # Errors
+    /// [`UpdateError::NotBegun`], [`UpdateError::WrongOffset`], [`UpdateError::TooMuch`],
+    /// [`UpdateError::Flash`].
+    pub fn chunk(&mut self, offset: u16, data: &[u8]) -> Result<(), UpdateError<F::Error>> {
+        let update = self.update.ok_or(UpdateError::NotBegun)?;
+        if offset != update.taken {
+            return Err(UpdateError::WrongOffset {
+                found: offset,
+                expected: update.taken,
+            });
+        }
+        let length = update.header.length;
+        let excess = data
+            .len()
+            .saturating_sub(usize::from(length - update.taken));
+        if excess > 0 {
+            return Err(UpdateError::TooMuch { excess, length });
+        }
+        // Over, should a write fail.
+        self.update = None;
+        self.update = Some(self.take_bytes(update, data)?);
+        Ok(())
+    }
+
+    /// Ends the update: reads the container back, checks it and commits it. Says the write count.
+    /// When this returns, the new genome is in use, also after a restart.
+    ///
+    /// # Errors
+    /// [`UpdateError::NotBegun`], [`UpdateError::Incomplete`], [`UpdateError::NotWritten`],
+    /// [`UpdateError::Defect`], [`UpdateError::Flash`].
+    pub fn commit(&mut self, room: &mut impl Room<F>) -> Result<u32, UpdateError<F::Error>> {
+        let update = self.update.ok_or(UpdateError::NotBegun)?;
+        let Update {
+            slot,
+            header,
+            taken,
+            block,
+        } = update;
+        if taken != header.length {
+            return Err(UpdateError::Incomplete {
+                taken,
+                length: header.length,
+            });
+        }
+        self.update = None;
+        let rest = usize::from(taken) % BLOCK_BYTES;
+        if rest > 0 {
+            let at = self.address(slot, CONTAINER_AT + u32::from(taken) - rest as u32);
+            self.write_block(at, &block, rest.next_multiple_of(F::WRITE_SIZE))?;
+        }
+        self.check_block(self.address(slot, 0), &header.to_block())?;
+        self.check(slot, header, room)?;
+
+        let at = self.address(slot, COMMIT_AT);
+        let commit = header.commit_block();
+        let written = self.write_block(at, &commit, commit_bytes(F::WRITE_SIZE));
+        // Only what is there counts, whatever the chip said: it decides after a restart.
+        match self.check_block(at, &commit) {
+            Ok(()) => {
+                *self.state_mut(slot) = SlotState::Committed(header);
+                self.in_use = Some((slot, header));
+                self.write_count = header.write_count;
+                Ok(header.write_count)
+            }
+            Err(unlike) => Err(written.err().unwrap_or(unlike)),
+        }
+    }
+
+    /// Drops an update that has begun, if there is one.
+    pub fn abort(&mut self) {
+        self.update = None;
+    }
+
+    /// Bytes of the container that have arrived; `None` if no update has begun.
+    #[must_use]
+    pub fn taken(&self) -> Option<u16> {
+        self.update.map(|update| update.taken)
+    }
+
+    /// A whole update: refuses what is not a genome to run before anything is erased, then begins,
+    /// writes and commits. Says the write count.
+    ///
+    /// # Errors
+    /// [`UpdateError::ImpossibleLength`], [`UpdateError::CountExhausted`],
+    /// [`UpdateError::NotWritten`], [`UpdateError::Defect`], [`UpdateError::Flash`].
+    pub fn write(
+        &mut self,
+        bytes: &[u8],
+        room: &mut impl Room<F>,
+    ) -> Result<u32, UpdateError<F::Error>> {
+        EncodedGenome::decode(bytes).map_err(Defect::Refused)?;
+        let found = bytes.len();
+        let impossible = UpdateError::ImpossibleLength { found };
+        let length = u16::try_from(found).map_err(|_| impossible)?;
+        self.begin(length, crc_of(bytes).unwrap_or(0))?;
+        self.chunk(0, bytes)?;
+        self.commit(room)
+    }
+
+    fn take_bytes(
+        &mut self,
+        mut update: Update,
+        data: &[u8],
+    ) -> Result<Update, UpdateError<F::Error>> {
+        for &byte in data {
+            let place = usize::from(update.taken) % BLOCK_BYTES;
+            if let Some(place) = update.block.get_mut(place) {
+                *place = byte;
+            }
+            update.taken += 1;
+            if place + 1 == BLOCK_BYTES {
+                let behind = CONTAINER_AT + u32::from(update.taken);
+                let at = self.address(update.slot, behind - BLOCK_BYTES as u32);
+                self.write_block(at, &update.block, BLOCK_BYTES)?;
+                update.block = ERASED;
+            }
+        }
+        Ok(update)
+    }
+
+    /// The slot that is not in use; without any, the one with the older contents.
+    fn slot_to_write(&self) -> Slot {
+        let [first, second] = self.states.map(SlotState::write_count);
+        match self.in_use {
+            Some((slot, _)) => slot.other(),
+            None if first <= second => Slot::First,
+            None => Slot::Second,
+        }
+    }
+
+    fn read_state(&mut self, slot: Slot) -> SlotState {
+        let at = self.address(slot, 0);
+        let commit_at = self.address(slot, COMMIT_AT);
+        let (Ok(header), Ok(commit)) = (self.read_block(at), self.read_block(commit_at)) else {
+            return SlotState::Unreadable;
+        };
+        match Header::from_block(&header) {
+            Some(fields) if fields.to_block() == header && fields.commit_block() == commit => {
+                SlotState::Committed(fields)
+            }
+            None if header == ERASED && commit == ERASED => SlotState::Empty,
+            _ => SlotState::Unfinished,
+        }
+    }
+
+    fn check(&mut self, slot: Slot, header: Header, room: &mut impl Room<F>) -> Result<(), Defect> {
+        let at = self.address(slot, CONTAINER_AT);
+        container(&mut self.flash, room, at, header).map(|_| ())
+    }
+
+    fn read_block(&mut self, at: u32) -> Result<Block, F::Error> {
+        let mut block = ERASED;
+        self.flash.read(at, &mut block)?;
+        Ok(block)
+    }
+
+    /// Writes the front of a block.
+    fn write_block(
+        &mut self,
+        at: u32,
+        block: &Block,
+        bytes: usize,
+    ) -> Result<(), UpdateError<F::Error>> {
+        let words = block.get(..bytes).unwrap_or(block);
+        self.flash.write(at, words).map_err(UpdateError::Flash)
+    }
+
+    fn check_block(&mut self, at: u32, block: &Block) -> Result<(), UpdateError<F::Error>> {
+        match self.read_block(at) {
+            Ok(found) if found == *block => Ok(()),
+            Ok(_) => Err(UpdateError::NotWritten),
+            Err(error) => Err(UpdateError::Flash(error)),
+        }
+    }
+
+    /// Address in flash of a place in a slot.
+    fn address(&self, slot: Slot, place: u32) -> u32 {
+        let slots_before = u32::from(slot.index());
+        self.offset + slots_before * Self::SLOT_BYTES as u32 + place
+    }
+
+    fn state_mut(&mut self, slot: Slot) -> &mut SlotState {
+        let [first, second] = &mut self.states;
+        match slot {
+            Slot::First => first,
+            Slot::Second => second,
+        }
+    }
+}
+
+/// The genome at `at`, if it is one to run and the one that the header announces.
+fn container<'a, F: NorFlash>(
+    flash: &'a mut F,
+    room: &'a mut impl Room<F>,
+    at: u32,
+    header: Header,
+) -> Result<EncodedGenome<'a>, Defect> {
+    let bytes = room.container(flash, at, usize::from(header.length));
+    let bytes = bytes.ok_or(Defect::Unreadable)?;
+    let genome = EncodedGenome::decode(bytes)?;
+    match crc_of(bytes) {
+        Some(crc) if crc == header.crc => Ok(genome),
+        found => Err(Defect::OtherContainer {
+            found: found.unwrap_or(0),
+            announced: header.crc,
+        }),
+    }
+}
+
+/// The CRC-32C that a container ends with.
+#[must_use]
+pub fn crc_of(container: &[u8]) -> Option<u32> {
+    let crc = container.last_chunk()?;
+    Some(u32::from_le_bytes(*crc))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use minimal_surprise_controller::{Action, SensorBits, State, Turn};
+
+    #[test]
+    fn the_built_in_controller_never_goes_straight() {
+        let controller = built_in_controller();
+        let mut inputs = 0;
+        for bits in 0..=controller.topology().model().mask().bits() {
+            for last in [Action::Straight, Action::Turn] {
+                let (action, turn) = controller.decide(SensorBits::new(bits), last);
+                assert_eq!((action, turn), (Action::Turn, Turn::Clockwise), "{bits:#x}");
+                inputs += 1;
+            }
+        }
+        assert_eq!(inputs, 32_768);
+        let mut state = State::new(&controller);
+        for bits in 0..=u16::MAX {
+            let decision = controller.step(&mut state, SensorBits::new(bits));
+            assert_eq!(decision.action, Action::Turn);
+        }
+    }
+}

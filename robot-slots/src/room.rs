@@ -1,0 +1,58 @@
+//! Where the bytes of a container are read: a buffer, or flash itself where it is memory mapped.
+
+use crate::layout::ROOM_BYTES;
+use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
+
+/// Gives the bytes of a container that is in flash.
+pub trait Room<F: ReadNorFlash> {
+    /// The `length` bytes at `at`, a byte address in flash that is a multiple of its read size;
+    /// `length` is at most the longest container's. `None` if they cannot be read.
+    fn container<'a>(&'a mut self, flash: &'a mut F, at: u32, length: usize) -> Option<&'a [u8]>;
+}
+
+/// Memory for one container, 1.3 KB. Make it a `static`, or part of one; it is much for a stack.
+#[derive(Clone, Debug)]
+pub struct Buffer {
+    bytes: [u8; ROOM_BYTES],
+}
+
+impl Buffer {
+    /// An empty one.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            bytes: [0; ROOM_BYTES],
+        }
+    }
+}
+
+impl Default for Buffer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<F: ReadNorFlash> Room<F> for Buffer {
+    fn container<'a>(&'a mut self, flash: &'a mut F, at: u32, length: usize) -> Option<&'a [u8]> {
+        let whole_words = length.checked_next_multiple_of(F::READ_SIZE)?;
+        flash.read(at, self.bytes.get_mut(..whole_words)?).ok()?;
+        self.bytes.get(..length)
+    }
+}
+
+/// A chip whose flash the processor can address like memory.
+pub trait MappedFlash: NorFlash {
+    /// All of the flash, from its byte address 0 on, as it is now.
+    fn bytes(&self) -> &[u8];
+}
+
+/// Reads containers where they are, without a copy.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct InPlace;
+
+impl<F: MappedFlash> Room<F> for InPlace {
+    fn container<'a>(&'a mut self, flash: &'a mut F, at: u32, length: usize) -> Option<&'a [u8]> {
+        let at = usize::try_from(at).ok()?;
+        flash.bytes().get(at..at.checked_add(length)?)
+    }
+}

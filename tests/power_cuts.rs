@@ -1,0 +1,528 @@
+//! The genome slots lose their power at every moment of an update, and again at every moment of
+//! the recovery.
+//!
+//! A moment is a byte of a write, the end of a write before anybody hears of it, or one of five
+//! ways in which an erase can end. Every first cut is made, and with `TEST_ALL=1` in a release build
+//! every second cut after each; otherwise some of those. `POWER_CUT=write_size:erase_size:first:second`
+//! makes one pair of cuts; a failure prints it.
+
+use embedded_storage::nor_flash::NorFlash;
+use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, Provenance, encode};
+use minimal_surprise_controller::{EncodedGenome, Genome, Topology};
+use minimal_surprise_slots::{
+    Buffer, CONTAINER_AT, Defect, InPlace, InUse, PlaceError, SlotState, Slots, UpdateError,
+    crc_of, slot_bytes,
+};
+use rand_chacha::ChaCha8Rng;
+use rand_core::SeedableRng;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+use tests::flash::{MockFlash, PowerCut};
+use tests::full::all_cases;
+
+/// Seed of the genomes.
+const SEED: u64 = 5;
+/// The reduced run goes on after one first cut in so many, and then makes one second cut in so
+/// many.
+const REDUCED: Strides = Strides {
+    first: 5,
+    second: 601,
+};
+/// All second cuts after all first ones.
+const ALL: Strides = Strides {
+    first: 1,
+    second: 1,
+};
+
+/// After one second cut in so many, the update is made once more, to its end.
+const THIRD_STRIDE: u64 = 16;
+
+/// A genome container that differs from those of other generations in every part.
+fn container(topology: Topology, generation: u32) -> Vec<u8> {
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED + u64::from(generation));
+    let genome = Genome::random(topology, &mut rng);
+    let provenance = Provenance {
+        seed: Some(SEED),
+        generation,
+        ..Provenance::default()
+    };
+    let mut buffer = [0; CONTAINER_BYTES_MAX];
+    encode(&genome, provenance, &mut buffer).unwrap().to_vec()
+}
+
+/// They differ in topology and length.
+fn old_and_new() -> [Vec<u8>; 2] {
+    [
+        container(Topology::ALL[7], 1),
+        container(Topology::default(), 2),
+    ]
+}
+
+/// What the slots give the robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Runs {
+    Old,
+    New,
+}
+
+/// The genome before an update, and the one that it brings.
+struct Genomes<'a> {
+    old_container: &'a [u8],
+    new_container: &'a [u8],
+    old: EncodedGenome<'a>,
+    new: EncodedGenome<'a>,
+}
+
+impl<'a> Genomes<'a> {
+    fn new([old_container, new_container]: &'a [Vec<u8>; 2]) -> Self {
+        Self {
+            old_container,
+            new_container,
+            old: EncodedGenome::decode(old_container).unwrap(),
+            new: EncodedGenome::decode(new_container).unwrap(),
+        }
+    }
+
+    /// Restarts the robot and says what it runs.
+    fn after_restart<const W: usize, const E: usize>(
+        &self,
+        flash: &mut MockFlash<W, E>,
+        room: &mut Buffer,
+    ) -> Runs {
+        flash.restore_power();
+        let mut slots = Slots::open(flash, MockFlash::<W, E>::OFFSET, room).unwrap();
+        match slots.in_use(room) {
+            InUse::Slot { genome, .. } if genome == self.old => Runs::Old,
+            InUse::Slot { genome, .. } if genome == self.new => Runs::New,
+            InUse::Slot { header, .. } => panic!("a genome of another time: {header:?}"),
+            InUse::BuiltIn => panic!("no genome at all: {slots:?}"),
+        }
+    }
+
+    /// Restarts the robot and writes the new genome, in chunks as they come over the line.
+    fn update<const W: usize, const E: usize>(
+        &self,
+        flash: &mut MockFlash<W, E>,
+        room: &mut Buffer,
+    ) -> Result<u32, UpdateError<PowerCut>> {
+        let mut slots = Slots::open(flash, MockFlash::<W, E>::OFFSET, room).unwrap();
+        let length = self.new_container.len() as u16;
+        slots.begin(length, crc_of(self.new_container).unwrap())?;
+        for (index, chunk) in self.new_container.chunks(100).enumerate() {
+            slots.chunk(100 * index as u16, chunk)?;
+        }
+        slots.commit(room)
+    }
+
+    /// A chip with the old genome in one slot and one still older in the other.
+    fn flash<const W: usize, const E: usize>(&self, room: &mut Buffer) -> MockFlash<W, E> {
+        let mut flash = MockFlash::<W, E>::new();
+        let mut slots = Slots::open(&mut flash, MockFlash::<W, E>::OFFSET, room).unwrap();
+        let oldest = container(Topology::default(), 0);
+        assert_eq!(slots.write(&oldest, room), Ok(1));
+        assert_eq!(slots.write(self.old_container, room), Ok(2));
+        flash
+    }
+}
+
+/// One pair of cuts, printed when it fails.
+struct Case {
+    write_size: usize,
+    erase_size: usize,
+    first: u64,
+    second: Option<u64>,
+}
+
+impl Drop for Case {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            let Self {
+                write_size,
+                erase_size,
+                first,
+                ..
+            } = self;
+            let second = self.second.map_or("-".into(), |second| second.to_string());
+            eprintln!(
+                "genome seed {SEED}; this case again: \
+                 POWER_CUT={write_size}:{erase_size}:{first}:{second} cargo test -p tests --test power_cuts"
+            );
+        }
+    }
+}
+
+/// Which second cuts to make.
+#[derive(Clone, Copy)]
+struct Strides {
+    first: u64,
+    second: u64,
+}
+
+/// Which cuts to make.
+#[derive(Clone, Copy)]
+enum Cuts {
+    /// Every first one, and some second ones.
+    Every(Strides),
+    /// One first, and perhaps one second.
+    One(u64, Option<u64>),
+}
+
+/// Makes the cuts on one kind of chip and says how many there were.
+fn cut_updates<const W: usize, const E: usize>(cuts: Cuts) -> u64 {
+    let containers = old_and_new();
+    let genomes = Genomes::new(&containers);
+    let room = &mut Buffer::new();
+    let before = genomes.flash::<W, E>(room);
+    let firsts = {
+        let mut flash = before.clone();
+        assert_eq!(genomes.update(&mut flash, room), Ok(3));
+        assert_eq!(genomes.after_restart(&mut flash, room), Runs::New);
+        0..flash.counts.moments - before.counts.moments
+    };
+    let firsts = match cuts {
+        Cuts::Every(_) => firsts,
+        Cuts::One(first, _) => {
+            assert!(firsts.contains(&first), "first cuts are {firsts:?}");
+            first..first + 1
+        }
+    };
+    let mut made = 0;
+    for first in firsts {
+        let mut case = Case {
+            write_size: W,
+            erase_size: E,
+            first,
+            second: None,
+        };
+        let mut flash = before.clone();
+        flash.cut_power_after(first, first);
+        genomes.update(&mut flash, room).expect_err("power failed");
+        made += 1;
+        let after_first = genomes.after_restart(&mut flash, room);
+
+        if matches!(cuts, Cuts::Every(strides) if !first.is_multiple_of(strides.first)) {
+            continue;
+        }
+        let mut unharmed = flash.clone();
+        let expected_count = if after_first == Runs::New { 4 } else { 3 };
+        assert_eq!(genomes.update(&mut unharmed, room), Ok(expected_count));
+        assert_eq!(genomes.after_restart(&mut unharmed, room), Runs::New);
+        let seconds = 0..unharmed.counts.moments - flash.counts.moments;
+        let (seconds, stride) = match cuts {
+            // Other second cuts for each first one.
+            Cuts::Every(strides) => (first % strides.second..seconds.end, strides.second),
+            Cuts::One(_, None) => (0..0, 1),
+            Cuts::One(_, Some(second)) => {
+                assert!(seconds.contains(&second), "second cuts are {seconds:?}");
+                (second..second + 1, 1)
+            }
+        };
+        for second in seconds.step_by(stride as usize) {
+            case.second = Some(second);
+            let mut flash = flash.clone();
+            flash.cut_power_after(second, first << 32 | second);
+            genomes.update(&mut flash, room).expect_err("power failed");
+            made += 1;
+            let after_second = genomes.after_restart(&mut flash, room);
+            if after_first == Runs::New {
+                assert_eq!(after_second, Runs::New, "it had been there already");
+            }
+            if second % THIRD_STRIDE == first % THIRD_STRIDE {
+                genomes.update(&mut flash, room).expect("power is back");
+                assert_eq!(genomes.after_restart(&mut flash, room), Runs::New);
+            }
+        }
+    }
+    made
+}
+
+/// A kind of chip: bytes written and erased at a time, and the test of it.
+type Chip = (usize, usize, fn(Cuts) -> u64);
+
+const CHIPS: [Chip; 12] = [
+    (1, 256, cut_updates::<1, 256>),
+    (4, 256, cut_updates::<4, 256>),
+    (8, 256, cut_updates::<8, 256>),
+    (32, 256, cut_updates::<32, 256>),
+    (1, 4 << 10, cut_updates::<1, { 4 << 10 }>),
+    (4, 4 << 10, cut_updates::<4, { 4 << 10 }>),
+    (8, 4 << 10, cut_updates::<8, { 4 << 10 }>),
+    (32, 4 << 10, cut_updates::<32, { 4 << 10 }>),
+    (1, 128 << 10, cut_updates::<1, { 128 << 10 }>),
+    (4, 128 << 10, cut_updates::<4, { 128 << 10 }>),
+    (8, 128 << 10, cut_updates::<8, { 128 << 10 }>),
+    (32, 128 << 10, cut_updates::<32, { 128 << 10 }>),
+];
+
+/// `write_size:erase_size:first:second`; `-` for no second cut.
+fn replayed_case(text: &str) -> Option<(Chip, Cuts)> {
+    let mut parts = text.split(':');
+    let write_size: usize = parts.next()?.parse().ok()?;
+    let erase_size: usize = parts.next()?.parse().ok()?;
+    let first = parts.next()?.parse().ok()?;
+    let second = match parts.next()? {
+        "-" => None,
+        second => Some(second.parse().ok()?),
+    };
+    let chip = CHIPS
+        .iter()
+        .find(|chip| (chip.0, chip.1) == (write_size, erase_size))?;
+    Some((*chip, Cuts::One(first, second)))
+}
+
+#[test]
+fn a_robot_runs_the_old_or_the_new_genome_whenever_its_power_fails() {
+    if let Ok(text) = std::env::var("POWER_CUT") {
+        let (chip, cuts) = replayed_case(&text).expect("POWER_CUT=1:256:17:4 or 1:256:17:-");
+        println!("{} cuts made", chip.2(cuts));
+        return;
+    }
+    let strides = match (all_cases(), cfg!(debug_assertions)) {
+        (true, false) => ALL,
+        (true, true) => {
+            println!("all second cuts take a release build: cargo test --release");
+            REDUCED
+        }
+        (false, _) => REDUCED,
+    };
+    let started = Instant::now();
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut sum = 0;
+        while let Some((write_size, erase_size, test)) =
+            CHIPS.get(next.fetch_add(1, Ordering::Relaxed))
+        {
+            let made = test(Cuts::Every(strides));
+            println!(
+                "words of {write_size:2} bytes, {erase_size:6} erased at a time: {made:8} cuts"
+            );
+            sum += made;
+        }
+        sum
+    };
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    let made: u64 = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().map(|w| w.join().unwrap()).sum()
+    });
+    println!("{made} power cuts in {:.1?}", started.elapsed());
+    assert!(made > 12 * 1300, "every byte is cut at least once");
+}
+
+#[test]
+fn the_first_genome_of_a_robot_is_there_wholly_or_not_at_all() {
+    type Flash = MockFlash<4, 256>;
+    let room = &mut Buffer::new();
+    let genome = container(Topology::default(), 1);
+    let write = |flash: &mut Flash, room: &mut Buffer| {
+        Slots::open(flash, Flash::OFFSET, room)
+            .unwrap()
+            .write(&genome, room)
+    };
+    let mut flash = Flash::new();
+    assert_eq!(write(&mut flash, room), Ok(1));
+    let moments = flash.counts.moments;
+    let mut built_in = 0;
+    for moment in 0..moments {
+        let mut flash = Flash::new();
+        flash.cut_power_after(moment, moment);
+        write(&mut flash, room).expect_err("power failed");
+        flash.restore_power();
+        let mut slots = Slots::open(&mut flash, Flash::OFFSET, room).unwrap();
+        match slots.in_use(room) {
+            InUse::Slot { genome: found, .. } => {
+                assert_eq!(EncodedGenome::decode(&genome), Ok(found), "moment {moment}");
+            }
+            InUse::BuiltIn => built_in += 1,
+        }
+        slots.write(&genome, room).expect("power is back");
+    }
+    // The last byte can be right although its writing was interrupted.
+    assert!(built_in >= moments - 9 && built_in < moments, "{built_in}");
+}
+
+#[test]
+fn slots_alternate_and_count_the_genomes_written() {
+    type Flash = MockFlash<8, 4096>;
+    let room = &mut Buffer::new();
+    let mut flash = Flash::new();
+    for count in 1..=9 {
+        let mut slots = Slots::open(&mut flash, Flash::OFFSET, room).unwrap();
+        assert_eq!(slots.write_count(), count - 1);
+        let genome = container(Topology::ALL[count as usize], count);
+        assert_eq!(slots.write(&genome, room), Ok(count));
+        let (slot, header) = slots.newest().unwrap();
+        assert_eq!(u32::from(slot.index()), (count - 1) % 2);
+        assert_eq!(header.write_count, count);
+        assert_eq!(usize::from(header.length), genome.len());
+        assert_eq!(Some(header.crc), crc_of(&genome));
+        assert_eq!(flash.counts.erases, u64::from(count));
+    }
+}
+
+#[test]
+fn a_damaged_genome_gives_way_to_the_older_one_and_both_to_the_built_in() {
+    type Flash = MockFlash<4, 4096>;
+    let room = &mut Buffer::new();
+    let mut flash = Genomes::new(&old_and_new()).flash::<4, 4096>(room);
+    for (damaged, left) in [(1, Some(1)), (0, None)] {
+        let at = Flash::OFFSET + damaged * slot_bytes(4096) as u32 + CONTAINER_AT + 99;
+        flash.damage(at, 0x10);
+        let mut slots = Slots::open(&mut flash, Flash::OFFSET, room).unwrap();
+        let count = slots.newest().map(|(_, header)| header.write_count);
+        assert_eq!(count, left);
+        let faults = minimal_surprise_slots::Slot::ALL
+            .map(|slot| matches!(slots.state(slot), SlotState::Damaged(_, Defect::Refused(_))));
+        assert_eq!(faults, [damaged == 0, true]);
+        assert_eq!(slots.in_use(room) == InUse::BuiltIn, left.is_none());
+        assert_eq!(slots.write_count(), 2, "the count survives");
+    }
+    let mut slots = Slots::open(&mut flash, Flash::OFFSET, room).unwrap();
+    let genome = container(Topology::default(), 7);
+    assert_eq!(slots.write(&genome, room), Ok(3));
+    assert_eq!(slots.newest().map(|(slot, _)| slot.index()), Some(0));
+}
+
+#[test]
+fn a_genome_in_chunks_is_the_genome_whole() {
+    type Flash = MockFlash<8, 256>;
+    let room = &mut Buffer::new();
+    let genome = container(Topology::default(), 1);
+    let (length, crc) = (genome.len() as u16, crc_of(&genome).unwrap());
+    for size in [1, 7, 31, 32, 33, 64, 100, 128, genome.len()] {
+        let mut flash = Flash::new();
+        let mut slots = Slots::open(&mut flash, Flash::OFFSET, room).unwrap();
+        slots.begin(length, crc).unwrap();
+        for (index, chunk) in genome.chunks(size).enumerate() {
+            let offset = (index * size) as u16;
+            assert_eq!(slots.taken(), Some(offset));
+            slots.chunk(offset, chunk).unwrap();
+        }
+        assert_eq!(slots.commit(room), Ok(1), "chunks of {size}");
+        assert_eq!(slots.commit(room), Err(UpdateError::NotBegun));
+        let whole = {
+            let mut flash = Flash::new();
+            let mut slots = Slots::open(&mut flash, Flash::OFFSET, room).unwrap();
+            slots.write(&genome, room).unwrap();
+            flash
+        };
+        let [mut a, mut b] = [vec![0; whole_bytes(&whole)], vec![0; whole_bytes(&whole)]];
+        embedded_storage::nor_flash::ReadNorFlash::read(&mut flash, 0, &mut a).unwrap();
+        embedded_storage::nor_flash::ReadNorFlash::read(&mut whole.clone(), 0, &mut b).unwrap();
+        assert_eq!(a, b, "chunks of {size}");
+    }
+}
+
+fn whole_bytes(flash: &impl NorFlash) -> usize {
+    flash.capacity()
+}
+
+#[test]
+fn chunks_out_of_place_are_refused_and_the_update_goes_on() {
+    type Flash = MockFlash<4, 256>;
+    let room = &mut Buffer::new();
+    let genome = container(Topology::default(), 1);
+    let length = genome.len() as u16;
+    let mut slots = Slots::open(Flash::new(), Flash::OFFSET, room).unwrap();
+    assert_eq!(slots.chunk(0, &[1]), Err(UpdateError::NotBegun));
+    for found in [0, CONTAINER_BYTES_MAX + 1] {
+        let refused = slots.begin(found as u16, 0);
+        assert_eq!(refused, Err(UpdateError::ImpossibleLength { found }));
+    }
+    slots.begin(length, crc_of(&genome).unwrap()).unwrap();
+    slots.chunk(0, &genome[..50]).unwrap();
+    for found in [0, 49, 51] {
+        let wrong = UpdateError::WrongOffset {
+            found,
+            expected: 50,
+        };
+        assert_eq!(slots.chunk(found, &genome[..9]), Err(wrong));
+    }
+    let too_much = UpdateError::TooMuch { excess: 50, length };
+    assert_eq!(slots.chunk(50, &genome), Err(too_much));
+    let incomplete = UpdateError::Incomplete { taken: 50, length };
+    assert_eq!(slots.commit(room), Err(incomplete));
+    slots.chunk(50, &[]).unwrap();
+    slots.chunk(50, &genome[50..]).unwrap();
+    assert_eq!(slots.commit(room), Ok(1));
+
+    slots.begin(length, 0).unwrap();
+    slots.abort();
+    assert_eq!(slots.chunk(0, &genome), Err(UpdateError::NotBegun));
+    assert_eq!(
+        slots.newest().map(|(_, header)| header.write_count),
+        Some(1)
+    );
+}
+
+#[test]
+fn what_is_not_the_announced_genome_is_never_committed() {
+    type Flash = MockFlash<4, 256>;
+    let room = &mut Buffer::new();
+    let genome = container(Topology::default(), 1);
+    let mut slots = Slots::open(Flash::new(), Flash::OFFSET, room).unwrap();
+    slots.begin(genome.len() as u16, 1).unwrap();
+    slots.chunk(0, &genome).unwrap();
+    let refused = slots.commit(room);
+    let found = crc_of(&genome).unwrap();
+    let announced = 1;
+    let other = Defect::OtherContainer { found, announced };
+    assert_eq!(refused, Err(UpdateError::Defect(other)));
+
+    let mut damaged = genome.clone();
+    damaged[40] ^= 1;
+    let before = slots.newest();
+    slots.begin(genome.len() as u16, found).unwrap();
+    slots.chunk(0, &damaged).unwrap();
+    let refused = slots.commit(room);
+    assert!(matches!(
+        refused,
+        Err(UpdateError::Defect(Defect::Refused(_)))
+    ));
+    assert_eq!(slots.newest(), before);
+
+    let flash = slots.release();
+    let erases = flash.counts.erases;
+    let mut slots = Slots::open(flash, Flash::OFFSET, room).unwrap();
+    assert!(matches!(
+        slots.write(&damaged, room),
+        Err(UpdateError::Defect(Defect::Refused(_)))
+    ));
+    assert_eq!(slots.release().counts.erases, erases, "nothing was erased");
+}
+
+#[test]
+fn mapped_flash_is_read_in_place() {
+    type Flash = MockFlash<4, 256>;
+    let genome = container(Topology::default(), 1);
+    let mut slots = Slots::open(Flash::new(), Flash::OFFSET, &mut InPlace).unwrap();
+    assert_eq!(slots.in_use(&mut InPlace), InUse::BuiltIn);
+    assert_eq!(slots.write(&genome, &mut InPlace), Ok(1));
+    match slots.in_use(&mut InPlace) {
+        InUse::Slot { genome: found, .. } => assert_eq!(Ok(found), EncodedGenome::decode(&genome)),
+        InUse::BuiltIn => panic!("it was written"),
+    }
+}
+
+#[test]
+fn slots_that_do_not_fit_are_refused() {
+    type Flash = MockFlash<4, 256>;
+    let open = |offset| Slots::open(Flash::new(), offset, &mut InPlace).map(|_| ());
+    assert_eq!(open(0), Ok(()));
+    assert_eq!(open(256), Ok(()));
+    assert_eq!(
+        open(100),
+        Err(PlaceError::NotAligned {
+            offset: 100,
+            erase_size: 256
+        })
+    );
+    for offset in [512, 1 << 31, u32::MAX - 255] {
+        let refused = PlaceError::OutOfBounds {
+            offset,
+            slot_bytes: 1536,
+            capacity: 13 * 256,
+        };
+        assert_eq!(open(offset), Err(refused));
+    }
+}

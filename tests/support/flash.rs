@@ -1,0 +1,264 @@
+//! A flash chip in memory that loses its power when told to, and forgives nothing.
+
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
+use minimal_surprise_slots::{MappedFlash, SLOT_BYTES_MIN, slot_bytes};
+use rand_chacha::ChaCha8Rng;
+use rand_core::{Rng, SeedableRng};
+
+/// A chip with words of `W` bytes, read and written whole, that erases `E` bytes at a time.
+///
+/// Misuse is a panic: unaligned operations, a word written twice between two completed erases, a
+/// place outside. Of erase units larger than a slot, only the bytes that a slot needs are kept, and
+/// only those may be used.
+#[derive(Clone, Debug)]
+pub struct MockFlash<const W: usize, const E: usize> {
+    bytes: Vec<u8>,
+    /// Per word, whether it may be written.
+    erased: Vec<bool>,
+    units: usize,
+    cut: Option<Cut>,
+    /// What has happened so far.
+    pub counts: Counts,
+    powered: bool,
+}
+
+/// What a flash has been through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Moments at which power could have failed.
+    pub moments: u64,
+    /// Calls of write.
+    pub writes: u64,
+    /// Bytes written.
+    pub written_bytes: u64,
+    /// Units erased.
+    pub erases: u64,
+}
+
+/// A power cut to come.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    at_moment: u64,
+    seed: u64,
+}
+
+/// Nothing works without power.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PowerCut;
+
+impl NorFlashError for PowerCut {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+/// How an erase ends whose power fails, in the order of its moments.
+const TORN_ERASES: [TornErase; 5] = [
+    TornErase::Untouched,
+    TornErase::HalfErased,
+    TornErase::SomeBitsErased,
+    TornErase::Random,
+    TornErase::ErasedButUnreported,
+];
+
+#[derive(Clone, Copy, Debug)]
+enum TornErase {
+    Untouched,
+    HalfErased,
+    SomeBitsErased,
+    Random,
+    ErasedButUnreported,
+}
+
+impl<const W: usize, const E: usize> MockFlash<W, E> {
+    /// Bytes kept of each erase unit.
+    const KEPT: usize = if E < SLOT_BYTES_MIN {
+        E
+    } else {
+        SLOT_BYTES_MIN
+    };
+    /// Where the slots are: behind one erase unit of something else.
+    pub const OFFSET: u32 = E as u32;
+
+    /// An erased chip with one erase unit before two slots.
+    #[must_use]
+    pub fn new() -> Self {
+        let units = 1 + 2 * slot_bytes(E) / E;
+        let kept = units * Self::KEPT;
+        Self {
+            bytes: vec![0xff; kept],
+            erased: vec![true; kept / W],
+            units,
+            cut: None,
+            counts: Counts::default(),
+            powered: true,
+        }
+    }
+
+    /// Power will fail after so many more moments; `seed` decides what is left behind.
+    pub fn cut_power_after(&mut self, moments: u64, seed: u64) {
+        self.cut = Some(Cut {
+            at_moment: self.counts.moments + moments,
+            seed,
+        });
+    }
+
+    /// Power is back, and stays.
+    pub fn restore_power(&mut self) {
+        self.powered = true;
+        self.cut = None;
+    }
+
+    /// Flips bits, as age does.
+    pub fn damage(&mut self, at: u32, mask: u8) {
+        let place = Self::place(at, 1);
+        self.bytes[place] ^= mask;
+    }
+
+    /// The place of `length` bytes at an address among those that are kept.
+    fn place(at: u32, length: usize) -> usize {
+        let at = at as usize;
+        let (unit, within) = (at / E, at % E);
+        if Self::KEPT == E {
+            return at;
+        }
+        let kept = Self::KEPT;
+        assert!(
+            within + length <= kept,
+            "{length} bytes at {at} are no slot's"
+        );
+        unit * kept + within
+    }
+
+    /// Whether power fails at this moment; the generator says how.
+    fn fails_now(&mut self) -> Option<ChaCha8Rng> {
+        let moment = self.counts.moments;
+        self.counts.moments += 1;
+        let cut = self.cut.filter(|cut| cut.at_moment == moment)?;
+        self.powered = false;
+        Some(ChaCha8Rng::seed_from_u64(cut.seed))
+    }
+
+    fn erase_unit(&mut self, unit: usize) -> Result<(), PowerCut> {
+        let kept = Self::KEPT;
+        let range = unit * kept..(unit + 1) * kept;
+        let words = range.start / W..range.end / W;
+        self.erased[words.clone()].fill(false);
+        for torn in TORN_ERASES {
+            if let Some(mut rng) = self.fails_now() {
+                let bytes = &mut self.bytes[range];
+                match torn {
+                    TornErase::Untouched => {}
+                    TornErase::HalfErased => bytes[..kept / 2].fill(0xff),
+                    TornErase::SomeBitsErased => {
+                        bytes.iter_mut().for_each(|b| *b |= rng.next_u32() as u8);
+                    }
+                    TornErase::Random => rng.fill_bytes(bytes),
+                    TornErase::ErasedButUnreported => bytes.fill(0xff),
+                }
+                return Err(PowerCut);
+            }
+        }
+        self.bytes[range].fill(0xff);
+        self.erased[words].fill(true);
+        self.counts.erases += 1;
+        Ok(())
+    }
+
+    /// What a word holds whose writing was interrupted at byte `whole`: bytes before it are
+    /// written, the others have some of their bits, or anything.
+    fn tear_word(word: &mut [u8], wanted: &[u8], whole: usize, rng: &mut ChaCha8Rng) {
+        let anything = rng.next_u32() & 1 == 0;
+        for (index, (byte, &wanted)) in word.iter_mut().zip(wanted).enumerate() {
+            let random = rng.next_u32() as u8;
+            *byte = match index < whole {
+                true => wanted,
+                false if anything => random,
+                false => wanted | random,
+            };
+        }
+    }
+}
+
+impl<const W: usize, const E: usize> Default for MockFlash<W, E> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const W: usize, const E: usize> ErrorType for MockFlash<W, E> {
+    type Error = PowerCut;
+}
+
+impl<const W: usize, const E: usize> ReadNorFlash for MockFlash<W, E> {
+    const READ_SIZE: usize = W;
+
+    fn read(&mut self, at: u32, bytes: &mut [u8]) -> Result<(), PowerCut> {
+        assert!((at as usize).is_multiple_of(W), "reads at {at}");
+        let length = bytes.len();
+        assert!(length.is_multiple_of(W), "reads {length} bytes");
+        if !self.powered {
+            return Err(PowerCut);
+        }
+        let place = Self::place(at, length);
+        bytes.copy_from_slice(&self.bytes[place..place + length]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.units * E
+    }
+}
+
+impl<const W: usize, const E: usize> NorFlash for MockFlash<W, E> {
+    const WRITE_SIZE: usize = W;
+    const ERASE_SIZE: usize = E;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerCut> {
+        let (from, to) = (from as usize, to as usize);
+        assert!(from < to && to <= self.capacity(), "erases {from}..{to}");
+        assert!(from.is_multiple_of(E), "erases from {from}");
+        assert!(to.is_multiple_of(E), "erases to {to}");
+        if !self.powered {
+            return Err(PowerCut);
+        }
+        (from / E..to / E).try_for_each(|unit| self.erase_unit(unit))
+    }
+
+    fn write(&mut self, at: u32, bytes: &[u8]) -> Result<(), PowerCut> {
+        assert!((at as usize).is_multiple_of(W), "writes at {at}");
+        let length = bytes.len();
+        assert!(length.is_multiple_of(W), "writes {length} bytes");
+        if !self.powered {
+            return Err(PowerCut);
+        }
+        self.counts.writes += 1;
+        let place = Self::place(at, length);
+        for (index, wanted) in bytes.chunks_exact(W).enumerate() {
+            let place = place + index * W;
+            let erased = &mut self.erased[place / W];
+            assert!(*erased, "word at {place:#x} written twice between erases");
+            *erased = false;
+            for whole in 0..W {
+                if let Some(mut rng) = self.fails_now() {
+                    let word = &mut self.bytes[place..place + W];
+                    Self::tear_word(word, wanted, whole, &mut rng);
+                    return Err(PowerCut);
+                }
+            }
+            self.bytes[place..place + W].copy_from_slice(wanted);
+            self.counts.written_bytes += W as u64;
+        }
+        // Written, but nobody hears of it.
+        self.fails_now().map_or(Ok(()), |_| Err(PowerCut))
+    }
+}
+
+impl<const W: usize, const E: usize> MappedFlash for MockFlash<W, E> {
+    fn bytes(&self) -> &[u8] {
+        assert_eq!(Self::KEPT, E, "all of it is kept");
+        &self.bytes
+    }
+}

@@ -1,0 +1,7 @@
+//! Reduced and full counts.
+
+/// Whether all cases are asked for: `TEST_ALL=1` in the environment.
+#[must_use]
+pub fn all_cases() -> bool {
+    std::env::var_os("TEST_ALL").is_some_and(|value| value == "1")
+}

@@ -1,0 +1,170 @@
+//! A robot behind a line, without wheels: slots in a mock flash and a controller.
+
+use crate::flash::MockFlash;
+use minimal_surprise_controller::{
+    Action, Controller, Decision, KERNEL_ID, SensorBits, State, Turn,
+};
+use minimal_surprise_link::{Faults, GenomeInUse, Handler, Identity, Refusal, Report, Stepped};
+use minimal_surprise_slots::{Buffer, Defect, Slots, UpdateError};
+
+/// Its flash.
+pub type Flash = MockFlash<4, 4096>;
+
+/// The robot.
+#[derive(Debug)]
+pub struct LinkRobot {
+    /// Where its genomes are.
+    pub slots: Slots<Flash>,
+    room: Buffer,
+    controller: Controller,
+    state: State,
+    report: Report,
+    /// Requests carried out, identification and telemetry not counted.
+    pub done: u64,
+}
+
+impl LinkRobot {
+    /// Switches it on.
+    ///
+    /// # Panics
+    /// If the flash has no room for slots.
+    #[must_use]
+    pub fn start(flash: Flash) -> Self {
+        let mut room = Buffer::new();
+        let mut slots = Slots::open(flash, Flash::OFFSET, &mut room).expect("there is room");
+        let controller = slots.in_use(&mut room).controller();
+        let state = State::new(&controller);
+        Self {
+            slots,
+            room,
+            controller,
+            state,
+            report: Report::default(),
+            done: 0,
+        }
+    }
+
+    /// Its flash, after it was switched off.
+    #[must_use]
+    pub fn stop(self) -> Flash {
+        self.slots.release()
+    }
+
+    fn faults(&self) -> Faults {
+        match self.slots.newest() {
+            Some(_) => Faults::NONE,
+            None => Faults::NO_GENOME,
+        }
+    }
+
+    fn standing(&mut self) -> Result<(), Refusal> {
+        if self.report.running {
+            return Err(Refusal::Running);
+        }
+        self.done += 1;
+        Ok(())
+    }
+
+    fn count(&mut self, decision: Decision) {
+        let counter = match (decision.action, decision.turn) {
+            (Action::Straight, _) => &mut self.report.straight,
+            (Action::Turn, Turn::CounterClockwise) => &mut self.report.turned_left,
+            (Action::Turn, Turn::Clockwise) => &mut self.report.turned_right,
+        };
+        *counter += 1;
+    }
+}
+
+/// What a robot tells the host about an update that failed.
+fn refusal<E: core::fmt::Debug>(error: UpdateError<E>) -> Refusal {
+    match error {
+        UpdateError::ImpossibleLength { .. } => Refusal::ImpossibleLength,
+        UpdateError::NotBegun => Refusal::NotBegun,
+        UpdateError::WrongOffset { expected, .. } => Refusal::WrongOffset { expected },
+        UpdateError::TooMuch { .. } | UpdateError::Incomplete { .. } => Refusal::OtherLength,
+        UpdateError::Defect(Defect::OtherContainer { .. } | Defect::Refused(_)) => {
+            Refusal::BadGenome
+        }
+        UpdateError::Flash(_)
+        | UpdateError::NotWritten
+        | UpdateError::CountExhausted
+        | UpdateError::Defect(Defect::Unreadable) => Refusal::Flash,
+    }
+}
+
+impl Handler for LinkRobot {
+    fn identify(&mut self) -> Identity<'_> {
+        let genome = match self.slots.newest() {
+            None => GenomeInUse::BuiltIn,
+            Some((slot, header)) => GenomeInUse::Slot {
+                slot: slot.index(),
+                write_count: header.write_count,
+                length: header.length,
+                crc: header.crc,
+            },
+        };
+        Identity {
+            firmware: "robot",
+            version: "0.1.0",
+            kernel: KERNEL_ID,
+            genome,
+            running: self.report.running,
+            faults: self.faults(),
+        }
+    }
+
+    fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal> {
+        self.standing()?;
+        self.slots.begin(length, crc).map_err(refusal)
+    }
+
+    fn chunk(&mut self, offset: u16, data: &[u8]) -> Result<(), Refusal> {
+        self.standing()?;
+        self.slots.chunk(offset, data).map_err(refusal)
+    }
+
+    fn commit(&mut self) -> Result<u32, Refusal> {
+        self.standing()?;
+        let count = self.slots.commit(&mut self.room).map_err(refusal)?;
+        self.controller = self.slots.in_use(&mut self.room).controller();
+        self.state = State::new(&self.controller);
+        Ok(count)
+    }
+
+    fn step(&mut self, sensors: SensorBits) -> Result<Stepped, Refusal> {
+        self.standing()?;
+        let decision = self.controller.step(&mut self.state, sensors);
+        self.count(decision);
+        Ok(Stepped {
+            decision,
+            surprise: self.state.surprise(),
+        })
+    }
+
+    fn reset(&mut self) -> Result<(), Refusal> {
+        self.standing()?;
+        self.state = State::new(&self.controller);
+        self.report = Report::default();
+        Ok(())
+    }
+
+    fn start(&mut self) -> Result<(), Refusal> {
+        self.done += 1;
+        self.report.running = true;
+        Ok(())
+    }
+
+    fn stop(&mut self) -> Result<(), Refusal> {
+        self.done += 1;
+        self.report.running = false;
+        Ok(())
+    }
+
+    fn telemetry(&mut self) -> Report {
+        Report {
+            surprise: self.state.surprise(),
+            faults: self.faults(),
+            ..self.report
+        }
+    }
+}
