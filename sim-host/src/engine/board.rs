@@ -170,14 +170,14 @@ impl Board {
     #[inline]
     pub(super) fn advance(&mut self, robot: &mut u32) {
         let (x, y) = (robot_word::x(*robot), robot_word::y(*robot));
-        let up = |from: u32, side: u32| if from + 1 == side { 0 } else { from + 1 };
-        let down = |from: u32, side: u32| if from == 0 { side - 1 } else { from - 1 };
-        let (to_x, to_y) = match robot_word::heading(*robot) {
-            0 => (up(x, self.width), y),
-            1 => (x, up(y, self.height)),
-            2 => (down(x, self.width), y),
-            _ => (x, down(y, self.height)),
+        // Headings are too mixed for branches to be foreseen.
+        let heading = robot_word::heading(*robot) as usize;
+        let across_the_edge = |to: u32, side: u32| {
+            let to = if to == side { 0 } else { to };
+            if to == u32::MAX { side - 1 } else { to }
         };
+        let to_x = across_the_edge(x.wrapping_add_signed([1, 0, -1, 0][heading]), self.width);
+        let to_y = across_the_edge(y.wrapping_add_signed([0, 1, 0, -1][heading]), self.height);
         if !self.rows.occupied(to_y, to_x) {
             self.flip(x, y);
             self.flip(to_x, to_y);

@@ -5,7 +5,7 @@ use super::every_step::Groups;
 use super::fixed_predictions;
 use super::flips::{Drawer, FlipSource};
 use super::lanes::{BLOCK_STEPS, Predictor};
-use super::network::PredictionWeights;
+use super::network::{PredictionWeights, expected_empty_at_start};
 use super::path::Path;
 use super::recording::{Recorder, Recording};
 use super::robot_word::{self, ACTION, POSITION};
@@ -212,7 +212,7 @@ impl Evaluator {
         );
         let controller = Controller::new(genome);
         let predictor = PredictionWeights::new(&controller, order)
-            .map(|weights| Predictor::new(self.recorder.path, &weights, order.sensors()));
+            .map(|weights| Predictor::new(self.recorder.path, &weights));
         self.actions.prepare(self.recorder.path, &controller, order);
         self.matches.clear();
         self.matches.resize(trials.trials.len(), 0);
@@ -224,7 +224,6 @@ impl Evaluator {
             evaluator: self,
             controller: &controller,
             predictor: predictor.as_ref(),
-            expected_empty: order.sensors() & !order.window(genome.topology().fixed().bits()),
             trials,
         };
         if run.evaluator.skips_repeats && !noisy && words <= RECORDING_WORDS_MAX {
@@ -240,8 +239,6 @@ struct Run<'a> {
     evaluator: &'a mut Evaluator,
     controller: &'a Controller,
     predictor: Option<&'a Predictor>,
-    /// Window bits that robots predict not occupied before their first step.
-    expected_empty: u16,
     trials: &'a TrialSet,
 }
 
@@ -258,6 +255,7 @@ impl Run<'_> {
             ..
         } = &mut *self.evaluator;
         let order = &self.trials.order;
+        let expected_empty = expected_empty_at_start(self.controller.topology(), order);
         let mut behaviour = Behaviour {
             controller: self.controller,
             order,
@@ -282,10 +280,9 @@ impl Run<'_> {
                 );
             }
             let add = |robot: usize, matched| matches[robot / robots] += matched;
-            let expected_empty = self.expected_empty;
             match self.predictor {
                 Some(predictor) => {
-                    skipping::count_matches(predictor, recording, steps, expected_empty, add);
+                    skipping::count_matches(predictor, recording, steps, add);
                 }
                 None => {
                     let sensors = order.sensors();
@@ -314,6 +311,7 @@ impl Run<'_> {
             ..
         } = &mut *self.evaluator;
         let order = &self.trials.order;
+        let expected_empty = expected_empty_at_start(self.controller.topology(), order);
         let mut behaviour = Behaviour {
             controller: self.controller,
             order,
@@ -334,7 +332,7 @@ impl Run<'_> {
                 swarm.reset(self.trials.scenario.grid(), &trial.starts);
                 flips.push(self.trials.flips(repetition));
             }
-            groups.reset(together, self.expected_empty);
+            groups.reset(together);
             for start in (0..steps).step_by(part_steps) {
                 let part = start..steps.min(start + part_steps);
                 recording.reset(together, part.len().div_ceil(BLOCK_STEPS));
@@ -353,7 +351,7 @@ impl Run<'_> {
                     None => fixed_predictions::count_matches(
                         recording,
                         part.len(),
-                        self.expected_empty,
+                        expected_empty,
                         order.sensors(),
                         |robot, matched| matches[robot / robots] += matched,
                     ),

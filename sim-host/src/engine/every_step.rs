@@ -1,21 +1,22 @@
 //! Predictions step by step, for noise and for swarms too large to record as a whole: robots stay
 //! in their lanes, and recordings are worked off part by part.
 
-use super::lanes::{BLOCK_STEPS, LANES, Lanes, Matches, Predictor};
+use super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, Predictor};
 use super::recording::Recording;
 
 /// The robots of some repetitions, 32 to a group, whose last group may not be full.
 #[derive(Default)]
 pub(super) struct Groups {
+    started: bool,
     lanes: Vec<Lanes>,
     matched: Vec<u64>,
 }
 
 impl Groups {
-    pub(super) fn reset(&mut self, robots: usize, expected_empty: u16) {
+    pub(super) fn reset(&mut self, robots: usize) {
+        self.started = false;
         self.lanes.clear();
-        self.lanes
-            .resize(robots.div_ceil(LANES), Lanes::at_start(expected_empty));
+        self.lanes.resize(robots.div_ceil(LANES), Lanes::at_start());
         self.matched.clear();
         self.matched.resize(robots.next_multiple_of(LANES), 0);
     }
@@ -23,7 +24,6 @@ impl Groups {
     /// Goes on by the `steps` recorded.
     pub(super) fn advance(&mut self, predictor: &Predictor, recording: &Recording, steps: usize) {
         let whole_blocks = steps / BLOCK_STEPS;
-        let last_steps = steps % BLOCK_STEPS;
         let robots = recording.robots();
         let mut matches = Matches::default();
         for (group, (lanes, matched)) in self
@@ -34,12 +34,17 @@ impl Groups {
         {
             let first = group * LANES;
             let in_group = LANES.min(robots - first);
-            let mut inputs = [0; LANES];
+            let mut next = Blocks {
+                inputs: [0; LANES],
+                starting: if self.started { 0 } else { u32::MAX },
+                first_steps: steps % BLOCK_STEPS,
+            };
             for block in 0..steps.div_ceil(BLOCK_STEPS) {
-                for (lane, input) in inputs.iter_mut().enumerate().take(in_group) {
+                for (lane, input) in next.inputs.iter_mut().enumerate().take(in_group) {
                     *input = recording.of_robot(first + lane)[block];
                 }
-                predictor.run_block(lanes, &inputs, last_steps, &mut matches);
+                predictor.run_block(lanes, &next, &mut matches);
+                next.starting = 0;
                 let counts = if block < whole_blocks {
                     &matches.block
                 } else {
@@ -50,6 +55,7 @@ impl Groups {
                 }
             }
         }
+        self.started = true;
     }
 
     /// Matches of robot `index`.

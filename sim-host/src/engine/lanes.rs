@@ -17,42 +17,48 @@ pub(super) const BLOCK_STEPS: usize = 4;
 /// Pairs of hidden neurons: factors come in pairs, because that is how vector units multiply.
 pub(super) const PAIRS: usize = MAX_HIDDEN / 2;
 
-/// What 32 robots remember from step to step.
+/// What 32 robots remember from step to step: hidden activations 2p (low half) and 2p + 1 (high
+/// half) of pair p, lane by lane.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct Lanes {
-    /// Hidden activations 2p (low half) and 2p + 1 (high half) of pair p, lane by lane.
     pub(super) hidden: [[u32; LANES]; PAIRS],
-    /// Window bits that are predicted *not* occupied. A bit matches where this differs from the
-    /// next reading.
-    pub(super) expected_empty: [u16; LANES],
 }
 
-/// How many bits matched in a block.
+/// What 32 robots meet in a block.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(super) struct Blocks {
+    /// Their inputs, the first step in the lowest 16 bits.
+    pub(super) inputs: [u64; LANES],
+    /// A bit for every lane whose robot is before its first step: its prediction is given.
+    pub(super) starting: u32,
+    /// Matches in this many steps (0 to 3) are also counted by themselves.
+    pub(super) first_steps: usize,
+}
+
+/// How many bits matched in a block, lane by lane.
 #[derive(Clone, Debug, Default)]
 #[repr(align(64))]
 pub(super) struct Matches {
-    /// In all four steps, lane by lane.
     pub(super) block: [u16; LANES],
-    /// In the first few; zero if that is no step.
+    /// In the first few steps only.
     pub(super) first_steps: [u16; LANES],
 }
 
 impl Lanes {
     /// Robots before their first step.
-    pub(super) fn at_start(expected_empty: u16) -> Self {
+    pub(super) fn at_start() -> Self {
         Self {
             hidden: [[0; LANES]; PAIRS],
-            expected_empty: [expected_empty; LANES],
         }
     }
 
     /// Puts a robot before its first step into a lane.
-    pub(super) fn restart(&mut self, lane: usize, expected_empty: u16) {
+    pub(super) fn restart(&mut self, lane: usize) {
         for pair in &mut self.hidden {
             pair[lane] = 0;
         }
-        self.expected_empty[lane] = expected_empty;
     }
 }
 
@@ -66,36 +72,31 @@ pub(super) enum Predictor {
 }
 
 impl Predictor {
-    pub(super) fn new(path: Path, weights: &PredictionWeights, sensors: u16) -> Self {
+    pub(super) fn new(path: Path, weights: &PredictionWeights) -> Self {
         match path {
-            Path::Portable => Self::Portable(Box::new(portable::Network::new(weights, sensors))),
+            Path::Portable => Self::Portable(Box::new(portable::Network::new(weights))),
             #[cfg(target_arch = "x86_64")]
-            Path::Avx2(cpu) => Self::Avx2(cpu, Box::new(x86::avx2::Network::new(weights, sensors))),
+            Path::Avx2(cpu) => Self::Avx2(cpu, Box::new(x86::avx2::Network::new(weights))),
             #[cfg(target_arch = "x86_64")]
-            Path::Avx512(cpu) => {
-                Self::Avx512(cpu, Box::new(x86::avx512::Network::new(weights, sensors)))
-            }
+            Path::Avx512(cpu) => Self::Avx512(cpu, Box::new(x86::avx512::Network::new(weights))),
         }
     }
 
-    /// Four steps of all lanes. The first `first_steps` of them (0 to 3) are also counted by
-    /// themselves. Returns a bit for every lane whose hidden activations are what they were before.
+    /// Four steps of all lanes. Returns a bit for every lane whose hidden activations are what they
+    /// were before.
     #[inline]
     pub(super) fn run_block(
         &self,
         lanes: &mut Lanes,
-        blocks: &[u64; LANES],
-        first_steps: usize,
+        blocks: &Blocks,
         matches: &mut Matches,
     ) -> u32 {
         match self {
-            Self::Portable(network) => network.run_block(lanes, blocks, first_steps, matches),
+            Self::Portable(network) => network.run_block(lanes, blocks, matches),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2(cpu, network) => cpu.run_block(network, lanes, blocks, first_steps, matches),
+            Self::Avx2(cpu, network) => cpu.run_block(network, lanes, blocks, matches),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512(cpu, network) => {
-                cpu.run_block(network, lanes, blocks, first_steps, matches)
-            }
+            Self::Avx512(cpu, network) => cpu.run_block(network, lanes, blocks, matches),
         }
     }
 }

@@ -4,10 +4,10 @@
 //! constant and one addend for each bit that is set; sums are exact, whatever the order.
 
 use super::window::{WINDOW_BITS, WindowOrder};
-use minimal_surprise_controller::Controller;
 use minimal_surprise_controller::controller::spread;
 use minimal_surprise_controller::fixed::ROUNDING_Q24;
 use minimal_surprise_controller::network::{MAX_HIDDEN, MAX_OUTPUTS, Network, SELF_LOOP};
+use minimal_surprise_controller::{Controller, Topology};
 
 /// What a hidden neuron makes of a window, Q24.
 #[derive(Clone, Copy, Debug, Default)]
@@ -58,9 +58,19 @@ impl HiddenSum {
     }
 }
 
+/// The window bits that a robot predicts *not* occupied before its first step. In predictions so
+/// put, a bit matches where it differs from the next reading.
+pub(super) fn expected_empty_at_start(topology: Topology, order: &WindowOrder) -> u16 {
+    order.sensors() & !order.window(topology.fixed().bits())
+}
+
 /// The network of one genome.
 #[derive(Clone, Debug)]
 pub(super) struct PredictionWeights {
+    /// Window bits that are sensors.
+    pub(super) sensors: u16,
+    /// Window bits predicted not occupied before the first step.
+    pub(super) expected_empty_at_start: u16,
     /// Hidden neurons in use.
     pub(super) hidden: usize,
     pub(super) sums: [HiddenSum; MAX_HIDDEN],
@@ -87,6 +97,8 @@ impl PredictionWeights {
         outputs.sort_unstable_by_key(|&(bit, _)| core::cmp::Reverse(bit));
         debug_assert!(outputs.len() <= MAX_OUTPUTS);
         Some(Self {
+            sensors: order.sensors(),
+            expected_empty_at_start: expected_empty_at_start(controller.topology(), order),
             hidden: network.shape().hidden(),
             sums: HiddenSum::of(network, order),
             self_loops: network.hidden_rows().map(|row| row[SELF_LOOP]),

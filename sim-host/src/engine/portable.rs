@@ -1,7 +1,7 @@
 //! Predictions without vector instructions of any one processor: lane after lane, the neurons of a
 //! layer side by side in arrays.
 
-use super::lanes::{BLOCK_STEPS, LANES, Lanes, Matches};
+use super::lanes::{BLOCK_STEPS, Blocks, Lanes, Matches};
 use super::network::PredictionWeights;
 use minimal_surprise_controller::activate;
 use minimal_surprise_controller::fixed::sum_to_q3_12;
@@ -12,6 +12,7 @@ const WIDTH: usize = 16;
 /// A prediction network as rows of neurons.
 pub(super) struct Network {
     sensors: u16,
+    expected_empty_at_start: u16,
     hidden: usize,
     /// For each value of each five bits of a window, what they add to every hidden sum.
     inputs: [[[i32; WIDTH]; 32]; 3],
@@ -21,9 +22,10 @@ pub(super) struct Network {
 }
 
 impl Network {
-    pub(super) fn new(weights: &PredictionWeights, sensors: u16) -> Self {
+    pub(super) fn new(weights: &PredictionWeights) -> Self {
         let mut network = Self {
-            sensors,
+            sensors: weights.sensors,
+            expected_empty_at_start: weights.expected_empty_at_start,
             hidden: weights.hidden,
             inputs: [[[0; WIDTH]; 32]; 3],
             self_loops: [0; WIDTH],
@@ -50,29 +52,31 @@ impl Network {
     pub(super) fn run_block(
         &self,
         lanes: &mut Lanes,
-        blocks: &[u64; LANES],
-        first_steps: usize,
+        blocks: &Blocks,
         matches: &mut Matches,
     ) -> u32 {
         let mut unchanged = 0;
-        for (lane, &block) in blocks.iter().enumerate() {
+        for (lane, &inputs) in blocks.inputs.iter().enumerate() {
             let mut hidden = [0_i16; WIDTH];
             for (pair, values) in lanes.hidden.iter().zip(hidden.chunks_exact_mut(2)) {
                 (values[0], values[1]) = (pair[lane] as i16, (pair[lane] >> 16) as i16);
             }
             let before = hidden;
-            let mut expected_empty = lanes.expected_empty[lane];
             let mut matched = 0;
             for step in 0..BLOCK_STEPS {
-                if step == first_steps {
+                if step == blocks.first_steps {
                     matches.first_steps[lane] = matched;
                 }
-                let window = (block >> (16 * step)) as u16;
+                let window = (inputs >> (16 * step)) as u16;
+                let expected_empty = if step == 0 && blocks.starting >> lane & 1 == 1 {
+                    self.expected_empty_at_start
+                } else {
+                    self.expected_empty(&hidden)
+                };
                 matched += ((expected_empty ^ window) & self.sensors).count_ones() as u16;
-                expected_empty = self.step(window, &mut hidden);
+                self.update_hidden(window, &mut hidden);
             }
             matches.block[lane] = matched;
-            lanes.expected_empty[lane] = expected_empty;
             for (pair, values) in lanes.hidden.iter_mut().zip(hidden.chunks_exact(2)) {
                 pair[lane] = u32::from(values[0] as u16) | u32::from(values[1] as u16) << 16;
             }
@@ -82,7 +86,7 @@ impl Network {
     }
 
     #[inline]
-    fn step(&self, window: u16, hidden: &mut [i16; WIDTH]) -> u16 {
+    fn update_hidden(&self, window: u16, hidden: &mut [i16; WIDTH]) {
         let rows = [0, 1, 2].map(|g| &self.inputs[g][usize::from(window >> (5 * g) & 31)]);
         let mut sums = [0_i32; WIDTH];
         for neuron in 0..WIDTH {
@@ -94,10 +98,15 @@ impl Network {
         for (value, sum) in hidden.iter_mut().zip(sums).take(self.hidden) {
             *value = activate(sum_to_q3_12(sum));
         }
+    }
+
+    /// The window bits that the activations predict not occupied.
+    #[inline]
+    fn expected_empty(&self, hidden: &[i16; WIDTH]) -> u16 {
         let mut expected_empty = 0;
         for (bit, row) in &self.outputs {
             let mut sum = 0;
-            for (&weight, &value) in row.iter().zip(hidden.iter()) {
+            for (&weight, &value) in row.iter().zip(hidden) {
                 sum += i32::from(weight) * i32::from(value);
             }
             expected_empty |= u16::from(sum < 0) << bit;

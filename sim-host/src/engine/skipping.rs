@@ -5,7 +5,7 @@
 //! matches in as many bits as the last one. Each lane is at its own place in the recording of its
 //! own robot, skips by itself, and takes the next robot when it has come to the end.
 
-use super::lanes::{BLOCK_STEPS, LANES, Lanes, Matches, Predictor};
+use super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, Predictor};
 use super::recording::Recording;
 
 /// Counts the matches of every robot recorded and hands them to `add`.
@@ -13,30 +13,31 @@ pub(super) fn count_matches(
     predictor: &Predictor,
     recording: &Recording,
     steps: usize,
-    expected_empty: u16,
     mut add: impl FnMut(usize, u64),
 ) {
     let whole_blocks = steps / BLOCK_STEPS;
-    let last_steps = steps % BLOCK_STEPS;
     let mut waiting = 0..recording.robots();
-    let mut lanes = Lanes::at_start(expected_empty);
+    let mut lanes = Lanes::at_start();
     let mut matches = Matches::default();
     let mut robot = [0; LANES];
     let mut block = [0; LANES];
     let mut matched = [0_u64; LANES];
-    let mut inputs = [0; LANES];
     let mut busy = 0_u32;
-    // A robot's first prediction is not made by its network, so its first block stands alone.
-    let mut fresh = 0_u32;
+    let mut next = Blocks {
+        inputs: [0; LANES],
+        starting: 0,
+        first_steps: steps % BLOCK_STEPS,
+    };
     for (lane, first) in waiting.by_ref().take(LANES).enumerate() {
         robot[lane] = first;
-        inputs[lane] = recording.of_robot(first)[0];
+        next.inputs[lane] = recording.of_robot(first)[0];
         busy |= 1 << lane;
     }
-    fresh |= busy;
+    next.starting = busy;
     while busy != 0 {
-        let unchanged = predictor.run_block(&mut lanes, &inputs, last_steps, &mut matches) & !fresh;
-        fresh = 0;
+        // A robot's first prediction is not made by its network, so its first block stands alone.
+        let unchanged = predictor.run_block(&mut lanes, &next, &mut matches) & !next.starting;
+        next.starting = 0;
         let now_busy = busy;
         for lane in (0..LANES).filter(|lane| now_busy >> lane & 1 == 1) {
             let blocks = recording.of_robot(robot[lane]);
@@ -50,25 +51,25 @@ pub(super) fn count_matches(
                 if unchanged >> lane & 1 == 1 {
                     let alike = blocks[block[lane]..whole_blocks]
                         .iter()
-                        .take_while(|&&next| next == inputs[lane])
+                        .take_while(|&&inputs| inputs == next.inputs[lane])
                         .count();
                     matched[lane] += alike as u64 * in_block;
                     block[lane] += alike;
                 }
             }
-            if let Some(&next) = blocks.get(block[lane]) {
-                inputs[lane] = next;
+            if let Some(&inputs) = blocks.get(block[lane]) {
+                next.inputs[lane] = inputs;
                 continue;
             }
             add(robot[lane], matched[lane]);
             match waiting.next() {
-                Some(next) => {
-                    robot[lane] = next;
+                Some(another) => {
+                    robot[lane] = another;
                     block[lane] = 0;
                     matched[lane] = 0;
-                    inputs[lane] = recording.of_robot(next)[0];
-                    lanes.restart(lane, expected_empty);
-                    fresh |= 1 << lane;
+                    next.inputs[lane] = recording.of_robot(another)[0];
+                    lanes.restart(lane);
+                    next.starting |= 1 << lane;
                 }
                 None => busy &= !(1 << lane),
             }

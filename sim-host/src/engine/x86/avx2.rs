@@ -1,6 +1,6 @@
 //! AVX2: predictions of 16 robots a register of activations, 8 a register of sums.
 
-use super::super::lanes::{BLOCK_STEPS, LANES, Lanes, Matches, PAIRS};
+use super::super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, PAIRS};
 use super::super::network::PredictionWeights;
 use core::arch::x86_64::*;
 use minimal_surprise_controller::activation::{MAGNITUDE_CLAMP, SEGMENT_SCALE, SEGMENTS};
@@ -24,6 +24,7 @@ pub(in super::super) struct Network {
     outputs: Vec<(u32, [i32; PAIRS])>,
     pairs_used: usize,
     sensors: u16,
+    expected_empty_at_start: u16,
 }
 
 /// Two weights as one factor of a product of pairs.
@@ -32,13 +33,14 @@ fn pair(even: i16, odd: i16) -> i32 {
 }
 
 impl Network {
-    pub(in super::super) fn new(weights: &PredictionWeights, sensors: u16) -> Self {
+    pub(in super::super) fn new(weights: &PredictionWeights) -> Self {
         let mut network = Self {
             inputs: [[[0; 8]; TABLES]; 2 * PAIRS],
             self_loops: [0; 2 * PAIRS],
             outputs: Vec::with_capacity(weights.outputs.len()),
             pairs_used: weights.hidden.div_ceil(2),
-            sensors,
+            sensors: weights.sensors,
+            expected_empty_at_start: weights.expected_empty_at_start,
         };
         for neuron in 0..weights.hidden {
             for (index, table) in network.inputs[neuron].iter_mut().enumerate() {
@@ -64,21 +66,19 @@ impl Network {
 pub(super) fn run_block(
     network: &Network,
     lanes: &mut Lanes,
-    blocks: &[u64; LANES],
-    first_steps: usize,
+    blocks: &Blocks,
     matches: &mut Matches,
 ) -> u32 {
     let mut windows = [[0_u16; LANES]; BLOCK_STEPS];
-    for (lane, &block) in blocks.iter().enumerate() {
+    for (lane, &block) in blocks.inputs.iter().enumerate() {
         for (step, windows) in windows.iter_mut().enumerate() {
             windows[lane] = (block >> (16 * step)) as u16;
         }
     }
     let mut unchanged = 0;
     for half in 0..LANES / HALF {
-        let robots = half * HALF..(half + 1) * HALF;
-        unchanged |=
-            run_half(network, lanes, &windows, first_steps, matches, robots.start) << robots.start;
+        let first = half * HALF;
+        unchanged |= run_half(network, lanes, &windows, blocks, matches, first) << first;
     }
     unchanged
 }
@@ -89,7 +89,7 @@ fn run_half(
     network: &Network,
     lanes: &mut Lanes,
     windows: &[[u16; LANES]; BLOCK_STEPS],
-    first_steps: usize,
+    blocks: &Blocks,
     matches: &mut Matches,
     first: usize,
 ) -> u32 {
@@ -100,14 +100,32 @@ fn run_half(
     for p in 0..network.pairs_used {
         (low[p], high[p]) = load_two(&lanes.hidden[p], first);
     }
-    let mut expected_empty = load(&lanes.expected_empty, first);
     let mut matched = _mm256_setzero_si256();
     store(&mut matches.first_steps, first, matched);
     for (step, windows) in windows.iter().enumerate() {
-        if step == first_steps {
+        if step == blocks.first_steps {
             store(&mut matches.first_steps, first, matched);
         }
         let window = load(windows, first);
+        let mut expected_empty = _mm256_setzero_si256();
+        for (bit, row) in &network.outputs {
+            let mut sums = [_mm256_setzero_si256(); 2];
+            for p in 0..network.pairs_used {
+                let weights = _mm256_set1_epi32(row[p]);
+                sums[0] = _mm256_add_epi32(sums[0], _mm256_madd_epi16(low[p], weights));
+                sums[1] = _mm256_add_epi32(sums[1], _mm256_madd_epi16(high[p], weights));
+            }
+            let signs = _mm256_srai_epi16::<15>(_mm256_packs_epi32(sums[0], sums[1]));
+            let bit = _mm256_set1_epi16((1_u16 << bit) as i16);
+            expected_empty = _mm256_or_si256(expected_empty, _mm256_and_si256(signs, bit));
+        }
+        // Packed signs are in the order of packing; windows are in the robots'.
+        expected_empty = _mm256_permute4x64_epi64::<0b11_01_10_00>(expected_empty);
+        if step == 0 {
+            let at_start = _mm256_set1_epi16(network.expected_empty_at_start as i16);
+            let starting = mask_of_bits(blocks.starting >> first);
+            expected_empty = _mm256_blendv_epi8(expected_empty, at_start, starting);
+        }
         let differing = _mm256_and_si256(_mm256_xor_si256(expected_empty, window), sensors);
         matched = _mm256_add_epi16(matched, ones(differing));
         let low_window = _mm256_cvtepu16_epi32(_mm256_castsi256_si128(window));
@@ -129,23 +147,8 @@ fn run_half(
             low[p] = _mm256_unpacklo_epi16(values[0], values[1]);
             high[p] = _mm256_unpackhi_epi16(values[0], values[1]);
         }
-        expected_empty = _mm256_setzero_si256();
-        for (bit, row) in &network.outputs {
-            let mut sums = [_mm256_setzero_si256(); 2];
-            for p in 0..network.pairs_used {
-                let weights = _mm256_set1_epi32(row[p]);
-                sums[0] = _mm256_add_epi32(sums[0], _mm256_madd_epi16(low[p], weights));
-                sums[1] = _mm256_add_epi32(sums[1], _mm256_madd_epi16(high[p], weights));
-            }
-            let signs = _mm256_srai_epi16::<15>(_mm256_packs_epi32(sums[0], sums[1]));
-            let bit = _mm256_set1_epi16((1_u16 << bit) as i16);
-            expected_empty = _mm256_or_si256(expected_empty, _mm256_and_si256(signs, bit));
-        }
-        // Packed signs are in the order of packing; windows are in the robots'.
-        expected_empty = _mm256_permute4x64_epi64::<0b11_01_10_00>(expected_empty);
     }
     store(&mut matches.block, first, matched);
-    store(&mut lanes.expected_empty, first, expected_empty);
     let mut unchanged = [_mm256_set1_epi32(-1); 2];
     for p in 0..network.pairs_used {
         let before = load_two(&lanes.hidden[p], first);
@@ -171,6 +174,16 @@ fn hidden_sum(network: &Network, neuron: usize, window: __m256i, hidden: __m256i
         index = _mm256_srli_epi32::<{ TABLE_BITS as i32 }>(index);
     }
     sum
+}
+
+/// All ones in the 16-bit lanes of the lowest bits that are set.
+#[target_feature(enable = "avx2")]
+#[inline]
+fn mask_of_bits(bits: u32) -> __m256i {
+    let mask =
+        core::array::from_fn::<u16, HALF, _>(|lane| 0_u16.wrapping_sub((bits >> lane) as u16 & 1));
+    // SAFETY: 16 words of 16 bits are a register.
+    unsafe { _mm256_loadu_si256(mask.as_ptr().cast()) }
 }
 
 /// Ones of every 16-bit lane.

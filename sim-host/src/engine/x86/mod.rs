@@ -8,7 +8,7 @@ pub(super) mod avx2;
 pub(super) mod avx512;
 
 use super::board::Board;
-use super::lanes::{LANES, Lanes, Matches};
+use super::lanes::{Blocks, Lanes, Matches};
 use super::window::WindowOrder;
 use minimal_surprise_controller::Controller;
 
@@ -43,12 +43,11 @@ impl Avx2 {
         self,
         network: &avx2::Network,
         lanes: &mut Lanes,
-        blocks: &[u64; LANES],
-        first_steps: usize,
+        blocks: &Blocks,
         matches: &mut Matches,
     ) -> u32 {
         // SAFETY: `self` exists only where AVX2 does.
-        unsafe { avx2::run_block(network, lanes, blocks, first_steps, matches) }
+        unsafe { avx2::run_block(network, lanes, blocks, matches) }
     }
 }
 
@@ -68,12 +67,11 @@ impl Avx512 {
         self,
         network: &avx512::Network,
         lanes: &mut Lanes,
-        blocks: &[u64; LANES],
-        first_steps: usize,
+        blocks: &Blocks,
         matches: &mut Matches,
     ) -> u32 {
         // SAFETY: `self` exists only where the instructions do.
-        unsafe { network.run_block(lanes, blocks, first_steps, matches) }
+        unsafe { network.run_block(lanes, blocks, matches) }
     }
 
     /// Works out the entries of all windows.

@@ -4,7 +4,7 @@
 //! undoes that. So hidden activations are in the robots' order wherever they are 32 bits wide, and
 //! windows are brought into the packed order when blocks are taken apart.
 
-use super::super::super::lanes::{BLOCK_STEPS, LANES, Lanes, Matches, PAIRS};
+use super::super::super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, PAIRS};
 use super::super::super::network::PredictionWeights;
 use super::activation::Activation;
 use core::arch::x86_64::*;
@@ -18,14 +18,11 @@ pub(in super::super::super) struct Network {
     self_loops: [i32; 2 * PAIRS],
     /// Weights of each output in pairs.
     outputs: [[i32; PAIRS]; 2 * PAIRS],
-    /// By how many bits the predictions before an output move on when it is added: 1, and 1 more
-    /// for each window bit between them that no output predicts.
-    gaps: [u32; 2 * PAIRS],
     outputs_used: usize,
+    runs: Vec<Run>,
     pairs_used: usize,
-    /// How far the last output's bit is from bit 0.
-    last_bit: u32,
     sensors: u16,
+    expected_empty_at_start: u16,
 }
 
 /// Two weights as one factor of a product of pairs.
@@ -34,16 +31,16 @@ fn pair(even: i16, odd: i16) -> i32 {
 }
 
 impl Network {
-    pub(in super::super::super) fn new(weights: &PredictionWeights, sensors: u16) -> Self {
+    pub(in super::super::super) fn new(weights: &PredictionWeights) -> Self {
         let mut network = Self {
             inputs: [[[0; 32]; 3]; 2 * PAIRS],
             self_loops: [0; 2 * PAIRS],
             outputs: [[0; PAIRS]; 2 * PAIRS],
-            gaps: [0; 2 * PAIRS],
             outputs_used: weights.outputs.len(),
+            runs: Run::all(weights.outputs.iter().map(|&(bit, _)| bit)),
             pairs_used: weights.hidden.div_ceil(2),
-            last_bit: weights.outputs.last().map_or(0, |&(bit, _)| bit),
-            sensors,
+            sensors: weights.sensors,
+            expected_empty_at_start: weights.expected_empty_at_start,
         };
         for neuron in 0..weights.hidden {
             network.inputs[neuron] = [0, 5, 10].map(|first| weights.sums[neuron].table(first));
@@ -54,13 +51,10 @@ impl Network {
                 pair(0, weight)
             };
         }
-        let mut bit_before = None;
-        for (output, (bit, row)) in weights.outputs.iter().enumerate() {
-            for (to, from) in network.outputs[output].iter_mut().zip(row.chunks_exact(2)) {
+        for (pairs, (_, row)) in network.outputs.iter_mut().zip(&weights.outputs) {
+            for (to, from) in pairs.iter_mut().zip(row.chunks_exact(2)) {
                 *to = pair(from[0], from[1]);
             }
-            network.gaps[output] = bit_before.map_or(1, |before: u32| before - bit);
-            bit_before = Some(*bit);
         }
         network
     }
@@ -70,15 +64,14 @@ impl Network {
     pub(in super::super) fn run_block(
         &self,
         lanes: &mut Lanes,
-        blocks: &[u64; LANES],
-        first_steps: usize,
+        blocks: &Blocks,
         matches: &mut Matches,
     ) -> u32 {
         match self.pairs_used {
-            7 => self.run_block_of::<7>(lanes, blocks, first_steps, matches),
-            6 => self.run_block_of::<6>(lanes, blocks, first_steps, matches),
-            4 => self.run_block_of::<4>(lanes, blocks, first_steps, matches),
-            3 => self.run_block_of::<3>(lanes, blocks, first_steps, matches),
+            7 => self.run_block_of::<7>(lanes, blocks, matches),
+            6 => self.run_block_of::<6>(lanes, blocks, matches),
+            4 => self.run_block_of::<4>(lanes, blocks, matches),
+            3 => self.run_block_of::<3>(lanes, blocks, matches),
             _ => unreachable!("hidden layers have 6, 8, 12 or 14 neurons"),
         }
     }
@@ -88,35 +81,31 @@ impl Network {
     fn run_block_of<const USED: usize>(
         &self,
         lanes: &mut Lanes,
-        blocks: &[u64; LANES],
-        first_steps: usize,
+        blocks: &Blocks,
         matches: &mut Matches,
     ) -> u32 {
-        let activation = Activation::new();
+        let windows = windows_in_packed_order(&blocks.inputs);
+        // Turn by turn, one holds the last hidden activations and the other gets the next.
+        let mut even = Hidden::<USED>::load(lanes);
+        let mut odd = Hidden::<USED>::none();
+        let at_start = _mm512_set1_epi16(self.expected_empty_at_start as i16);
+        let starting = in_packed_order(blocks.starting);
+        let expected = [
+            _mm512_mask_mov_epi16(self.step(windows[0], &even, &mut odd), starting, at_start),
+            self.step(windows[1], &odd, &mut even),
+            self.step(windows[2], &even, &mut odd),
+            self.step(windows[3], &odd, &mut even),
+        ];
         let sensors = _mm512_set1_epi16(self.sensors as i16);
-        let to_packed = load(&PACKED_ORDER.0);
-        let windows = windows_in_packed_order(blocks);
-        let mut expected_empty = _mm512_permutexvar_epi16(to_packed, load(&lanes.expected_empty));
-        let mut low = [_mm512_setzero_si512(); USED];
-        let mut high = [_mm512_setzero_si512(); USED];
-        for pair in 0..USED {
-            (low[pair], high[pair]) = load_two(&lanes.hidden[pair]);
-        }
         let mut matched = _mm512_setzero_si512();
         let mut matched_first = matched;
-        for (step, &window) in windows.iter().enumerate() {
-            if step == first_steps {
+        for step in 0..BLOCK_STEPS {
+            if step == blocks.first_steps {
                 matched_first = matched;
             }
-            let differing = _mm512_xor_si512(expected_empty, window);
+            let differing = _mm512_xor_si512(expected[step], windows[step]);
             let matching = _mm512_popcnt_epi16(_mm512_and_si512(differing, sensors));
             matched = _mm512_add_epi16(matched, matching);
-
-            let zero = _mm512_setzero_si512();
-            let low_window = _mm512_unpacklo_epi16(window, zero);
-            let high_window = _mm512_unpackhi_epi16(window, zero);
-            self.hidden_layer(activation, low_window, high_window, &mut low, &mut high);
-            expected_empty = self.output_layer(&low, &high);
         }
         let to_robots = load(&ROBOT_ORDER.0);
         store(
@@ -127,88 +116,206 @@ impl Network {
             &mut matches.first_steps,
             _mm512_permutexvar_epi16(to_robots, matched_first),
         );
-        store(
-            &mut lanes.expected_empty,
-            _mm512_permutexvar_epi16(to_robots, expected_empty),
-        );
-        let mut low_unchanged = u16::MAX;
-        let mut high_unchanged = u16::MAX;
-        for pair in 0..USED {
-            let (low_before, high_before) = load_two(&lanes.hidden[pair]);
-            low_unchanged &= _mm512_cmpeq_epi32_mask(low_before, low[pair]);
-            high_unchanged &= _mm512_cmpeq_epi32_mask(high_before, high[pair]);
-            store_two(&mut lanes.hidden[pair], low[pair], high[pair]);
-        }
-        u32::from(low_unchanged) | u32::from(high_unchanged) << 16
+        even.store_and_compare(lanes)
+    }
+
+    /// One step: works out the next hidden activations and returns the window bits that the last
+    /// ones predict not occupied, in packed order.
+    ///
+    /// The two depend on the last activations only, so neither waits for the other's results.
+    #[target_feature(enable = "avx512f,avx512bw,avx512vbmi2,avx512vnni")]
+    #[inline]
+    fn step<const USED: usize>(
+        &self,
+        window: __m512i,
+        last: &Hidden<USED>,
+        next: &mut Hidden<USED>,
+    ) -> __m512i {
+        self.hidden_layer(window, last, next);
+        self.output_layer(last)
     }
 
     #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
     #[inline]
     fn hidden_layer<const USED: usize>(
         &self,
-        activation: Activation,
-        low_window: __m512i,
-        high_window: __m512i,
-        low: &mut [__m512i; USED],
-        high: &mut [__m512i; USED],
+        window: __m512i,
+        last: &Hidden<USED>,
+        next: &mut Hidden<USED>,
     ) {
-        // A permutation by the lowest five bits of an index needs no mask.
-        let by_fives = |window| {
-            [
-                window,
-                _mm512_srli_epi32::<5>(window),
-                _mm512_srli_epi32::<10>(window),
-            ]
-        };
-        let low_windows = by_fives(low_window);
-        let high_windows = by_fives(high_window);
+        let activation = Activation::new();
+        let zero = _mm512_setzero_si512();
+        let low_windows = by_fives(_mm512_unpacklo_epi16(window, zero));
+        let high_windows = by_fives(_mm512_unpackhi_epi16(window, zero));
         for pair in 0..USED {
-            let mut values = [_mm512_setzero_si512(); 2];
-            for (odd, value) in values.iter_mut().enumerate() {
-                let neuron = 2 * pair + odd;
-                let self_loop = _mm512_set1_epi32(self.self_loops[neuron]);
-                let sum = |windows: &[__m512i; 3], hidden: __m512i| {
-                    let [a, b, c] = core::array::from_fn(|five| {
-                        let (first, second) = load_two_i32(&self.inputs[neuron][five]);
-                        _mm512_permutex2var_epi32(first, windows[five], second)
-                    });
-                    let sum = _mm512_dpwssd_epi32(a, hidden, self_loop);
-                    _mm512_add_epi32(sum, _mm512_add_epi32(b, c))
-                };
-                *value = activation
-                    .activate_sums(sum(&low_windows, low[pair]), sum(&high_windows, high[pair]));
-            }
-            low[pair] = _mm512_unpacklo_epi16(values[0], values[1]);
-            high[pair] = _mm512_unpackhi_epi16(values[0], values[1]);
+            let (even, odd) = (2 * pair, 2 * pair + 1);
+            let (low, high) = (last.low[pair], last.high[pair]);
+            let even = activation.activate_sums(
+                self.hidden_sum(even, low_windows, low),
+                self.hidden_sum(even, high_windows, high),
+            );
+            let odd = activation.activate_sums(
+                self.hidden_sum(odd, low_windows, low),
+                self.hidden_sum(odd, high_windows, high),
+            );
+            next.low[pair] = _mm512_unpacklo_epi16(even, odd);
+            next.high[pair] = _mm512_unpackhi_epi16(even, odd);
         }
     }
 
-    /// The window bits predicted not occupied, in packed order.
+    /// What 16 robots' windows and last activations add up to.
+    #[target_feature(enable = "avx512f,avx512vnni")]
+    #[inline]
+    fn hidden_sum(&self, neuron: usize, windows: [__m512i; 3], last: __m512i) -> __m512i {
+        let [a, b, c] = &self.inputs[neuron];
+        let a = look_up(a, windows[0]);
+        let b = look_up(b, windows[1]);
+        let c = look_up(c, windows[2]);
+        let self_loop = _mm512_set1_epi32(self.self_loops[neuron]);
+        _mm512_add_epi32(add_products(a, last, self_loop), _mm512_add_epi32(b, c))
+    }
+
     #[target_feature(enable = "avx512f,avx512bw,avx512vbmi2,avx512vnni")]
     #[inline]
-    fn output_layer<const USED: usize>(
-        &self,
-        low: &[__m512i; USED],
-        high: &[__m512i; USED],
-    ) -> __m512i {
-        let mut expected_empty = _mm512_setzero_si512();
-        for (row, &gap) in self.outputs.iter().zip(&self.gaps).take(self.outputs_used) {
-            let mut low_sum = _mm512_setzero_si512();
-            let mut high_sum = _mm512_setzero_si512();
+    fn output_layer<const USED: usize>(&self, hidden: &Hidden<USED>) -> __m512i {
+        let mut signs = _mm512_setzero_si512();
+        for weights in self.outputs.iter().take(self.outputs_used) {
+            let mut low = _mm512_setzero_si512();
+            let mut high = _mm512_setzero_si512();
             for pair in 0..USED {
-                let weights = _mm512_set1_epi32(row[pair]);
-                low_sum = _mm512_dpwssd_epi32(low_sum, low[pair], weights);
-                high_sum = _mm512_dpwssd_epi32(high_sum, high[pair], weights);
-            }
-            for _ in 1..gap {
-                expected_empty = _mm512_slli_epi16::<1>(expected_empty);
+                let weights = _mm512_set1_epi32(weights[pair]);
+                low = add_products(low, hidden.low[pair], weights);
+                high = add_products(high, hidden.high[pair], weights);
             }
             // Packing saturates, which keeps the sign; the sign bit is shifted in.
-            let sums = _mm512_packs_epi32(low_sum, high_sum);
-            expected_empty = _mm512_shldi_epi16::<1>(expected_empty, sums);
+            signs = _mm512_shldi_epi16::<1>(signs, _mm512_packs_epi32(low, high));
         }
-        _mm512_sll_epi16(expected_empty, _mm_cvtsi32_si128(self.last_bit as i32))
+        let mut expected_empty = _mm512_setzero_si512();
+        for run in &self.runs {
+            let signs = _mm512_and_si512(signs, _mm512_set1_epi16(run.signs as i16));
+            let signs = _mm512_sll_epi16(signs, _mm_cvtsi32_si128(run.shift as i32));
+            expected_empty = _mm512_or_si512(expected_empty, signs);
+        }
+        expected_empty
     }
+}
+
+/// Outputs that predict neighbouring window bits.
+struct Run {
+    /// Their places among the signs of all outputs.
+    signs: u16,
+    /// How far these are from the window bits.
+    shift: u32,
+}
+
+impl Run {
+    /// The runs of outputs that predict these bits, the highest first. The last output's sign is
+    /// bit 0.
+    fn all(window_bits: impl DoubleEndedIterator<Item = u32>) -> Vec<Self> {
+        let mut runs: Vec<Self> = Vec::new();
+        for (sign, bit) in window_bits.rev().enumerate() {
+            let shift = bit - sign as u32;
+            match runs.last_mut() {
+                Some(run) if run.shift == shift => run.signs |= 1 << sign,
+                _ => runs.push(Self {
+                    signs: 1 << sign,
+                    shift,
+                }),
+            }
+        }
+        runs
+    }
+}
+
+/// Windows, and windows moved on by five and by ten bits: indices of tables of 32 entries.
+#[target_feature(enable = "avx512f")]
+#[inline]
+fn by_fives(windows: __m512i) -> [__m512i; 3] {
+    [
+        windows,
+        _mm512_srli_epi32::<5>(windows),
+        _mm512_srli_epi32::<10>(windows),
+    ]
+}
+
+/// The entries that the lowest five bits of the indices choose.
+#[target_feature(enable = "avx512f")]
+#[inline]
+fn look_up(table: &[i32; 32], indices: __m512i) -> __m512i {
+    // SAFETY: 32 words of 32 bits are two registers.
+    let (first, second) = unsafe {
+        let first = table.as_ptr().cast::<__m512i>();
+        (_mm512_loadu_si512(first), _mm512_loadu_si512(first.add(1)))
+    };
+    _mm512_permutex2var_epi32(first, indices, second)
+}
+
+/// Hidden activations in pairs, of the first 16 robots and of the others.
+struct Hidden<const USED: usize> {
+    low: [__m512i; USED],
+    high: [__m512i; USED],
+}
+
+impl<const USED: usize> Hidden<USED> {
+    #[target_feature(enable = "avx512f")]
+    #[inline]
+    fn none() -> Self {
+        Self {
+            low: [_mm512_setzero_si512(); USED],
+            high: [_mm512_setzero_si512(); USED],
+        }
+    }
+
+    #[target_feature(enable = "avx512f")]
+    #[inline]
+    fn load(lanes: &Lanes) -> Self {
+        let mut hidden = Self::none();
+        for pair in 0..USED {
+            (hidden.low[pair], hidden.high[pair]) = load_two(&lanes.hidden[pair]);
+        }
+        hidden
+    }
+
+    /// A bit for every robot whose activations were there already.
+    #[target_feature(enable = "avx512f")]
+    #[inline]
+    fn store_and_compare(&self, lanes: &mut Lanes) -> u32 {
+        let mut low_unchanged = u16::MAX;
+        let mut high_unchanged = u16::MAX;
+        for pair in 0..USED {
+            let (low_before, high_before) = load_two(&lanes.hidden[pair]);
+            low_unchanged &= _mm512_cmpeq_epi32_mask(low_before, self.low[pair]);
+            high_unchanged &= _mm512_cmpeq_epi32_mask(high_before, self.high[pair]);
+            store_two(&mut lanes.hidden[pair], self.low[pair], self.high[pair]);
+        }
+        u32::from(low_unchanged) | u32::from(high_unchanged) << 16
+    }
+}
+
+/// Bits of robots in packed order.
+#[target_feature(enable = "avx512f,avx512bw")]
+#[inline]
+fn in_packed_order(robots: u32) -> __mmask32 {
+    let bits = _mm512_maskz_set1_epi16(robots, -1);
+    _mm512_movepi16_mask(_mm512_permutexvar_epi16(load(&PACKED_ORDER.0), bits))
+}
+
+/// `_mm512_dpwssd_epi32`, which in a chain the compiler would split into a multiplication and an
+/// addition, to shorten the chain; but there are other chains enough to fill the time.
+#[target_feature(enable = "avx512f,avx512vnni")]
+#[inline]
+fn add_products(mut sum: __m512i, a: __m512i, b: __m512i) -> __m512i {
+    // SAFETY: the instruction changes the register of `sum` only.
+    unsafe {
+        core::arch::asm!(
+            "vpdpwssd {sum}, {a}, {b}",
+            sum = inout(zmm_reg) sum,
+            a = in(zmm_reg) a,
+            b = in(zmm_reg) b,
+            options(pure, nomem, nostack, preserves_flags),
+        );
+    }
+    sum
 }
 
 /// A register in memory.
@@ -292,16 +399,6 @@ fn store(words: &mut [u16; LANES], value: __m512i) {
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn load_two(words: &[u32; LANES]) -> (__m512i, __m512i) {
-    // SAFETY: 32 words of 32 bits are two registers.
-    unsafe {
-        let first = words.as_ptr().cast::<__m512i>();
-        (_mm512_loadu_si512(first), _mm512_loadu_si512(first.add(1)))
-    }
-}
-
-#[target_feature(enable = "avx512f")]
-#[inline]
-fn load_two_i32(words: &[i32; 32]) -> (__m512i, __m512i) {
     // SAFETY: 32 words of 32 bits are two registers.
     unsafe {
         let first = words.as_ptr().cast::<__m512i>();
