@@ -1,0 +1,139 @@
+//! The parts of an evaluation, one by one, so that a loss shows where it happened.
+//!
+//! `cargo bench -p minimal-surprise-evolver`; the whole is measured by `evolver bench`.
+
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use minimal_surprise_controller::{
+    Controller, EncodedGenome, Genome, MutationRate, Provenance, SensorBits, SensorModel, State,
+    activate, codec,
+};
+use minimal_surprise_evolver::bench::populations;
+use minimal_surprise_sim::structures::classify;
+use minimal_surprise_sim::{
+    Engine, Evaluator, Grid, NoiseRate, Path, Purpose, Scenario, SeedTree, TrialSet, World,
+};
+use std::hint::black_box;
+
+fn main() {
+    divan::main();
+}
+
+/// A genome from the middle of an evolution.
+fn genome() -> Genome {
+    populations::c_15x15().swap_remove(30)
+}
+
+fn trials(noise: f64, repetitions: u32) -> TrialSet {
+    let grid = Grid::new(15, 15).expect("a valid grid");
+    let noise = NoiseRate::new(noise).expect("a valid rate");
+    let scenario = Scenario::new(grid, 100, 500, noise).expect("a valid scenario");
+    let trials = (0..repetitions)
+        .map(|repetition| scenario.trial(SeedTree::new(1), 0, repetition))
+        .collect();
+    TrialSet::new(scenario, SensorModel::C, trials)
+}
+
+#[divan::bench]
+fn activation_of_all_inputs(bencher: Bencher) {
+    bencher.counter(ItemsCount::new(65_536_usize)).bench(|| {
+        (i16::MIN..=i16::MAX)
+            .map(|x| i32::from(activate(black_box(x))))
+            .sum::<i32>()
+    });
+}
+
+#[divan::bench]
+fn controller_from_a_genome(bencher: Bencher) {
+    let genome = genome();
+    bencher.bench(|| Controller::new(black_box(&genome)));
+}
+
+#[divan::bench]
+fn genome_decoded(bencher: Bencher) {
+    let mut buffer = [0; codec::CONTAINER_BYTES_MAX];
+    let bytes = codec::encode(&genome(), Provenance::default(), &mut buffer).expect("it fits");
+    bencher.bench(|| EncodedGenome::decode(black_box(bytes)).is_ok());
+}
+
+#[divan::bench]
+fn genome_mutated(bencher: Bencher) {
+    let rate = MutationRate::ratio(1, 10).expect("a valid rate");
+    let mut stream = SeedTree::new(1).stream(Purpose::Mutation, 0, 0);
+    let mut genome = genome();
+    bencher.bench_local(|| genome.mutate(rate, &mut stream));
+}
+
+#[divan::bench]
+fn one_robots_decision(bencher: Bencher) {
+    let controller = Controller::new(&genome());
+    let state = State::new(&controller);
+    bencher.bench(|| controller.decide(black_box(SensorBits::new(0x1234)), state.last_action()));
+}
+
+#[divan::bench]
+fn one_robots_step(bencher: Bencher) {
+    let controller = Controller::new(&genome());
+    let mut state = State::new(&controller);
+    bencher.bench_local(|| controller.step(&mut state, black_box(SensorBits::new(0x1234))));
+}
+
+#[divan::bench]
+fn plain_worlds_step_of_100_robots(bencher: Bencher) {
+    let trials = trials(0.0, 1);
+    let controller = Controller::new(&genome());
+    let trial = &trials.trials()[0];
+    let grid = trials.scenario().grid();
+    let mut world = World::new(grid, &trial.starts, &controller).expect("a drawn start");
+    let mut noise = trial.noise.clone();
+    bencher
+        .counter(ItemsCount::new(100_usize))
+        .bench_local(|| world.step(&controller, &mut noise));
+}
+
+/// The fast engine's world alone: sensing, actions by table, moving.
+#[divan::bench(args = Path::available().into_iter().map(Path::name))]
+fn fast_world_of_500_steps(bencher: Bencher, path: &str) {
+    let trials = trials(0.0, 1);
+    let genome = genome();
+    let mut evaluator = evaluator(path);
+    bencher
+        .counter(ItemsCount::new(50_000_usize))
+        .bench_local(|| evaluator.motion(&genome, &trials, 0));
+}
+
+#[divan::bench(args = Path::available().into_iter().map(Path::name))]
+fn evaluation(bencher: Bencher, path: &str) {
+    evaluation_of(bencher, evaluator(path), 0.0);
+}
+
+#[divan::bench(args = Path::available().into_iter().map(Path::name))]
+fn evaluation_without_the_shortcut(bencher: Bencher, path: &str) {
+    evaluation_of(bencher, evaluator(path).with_repeats_skipped(false), 0.0);
+}
+
+#[divan::bench(args = Path::available().into_iter().map(Path::name))]
+fn evaluation_with_noise(bencher: Bencher, path: &str) {
+    evaluation_of(bencher, evaluator(path), 0.1);
+}
+
+#[divan::bench]
+fn structures_of_100_robots(bencher: Bencher) {
+    let trials = trials(0.0, 1);
+    let grid = trials.scenario().grid();
+    let poses = &trials.trials()[0].starts;
+    bencher.bench(|| classify(grid, black_box(poses)));
+}
+
+fn evaluator(path: &str) -> Evaluator {
+    let path = Path::named(path).expect("one of those available");
+    Evaluator::new(Engine::Fast, path)
+}
+
+fn evaluation_of(bencher: Bencher, mut evaluator: Evaluator, noise: f64) {
+    let trials = trials(noise, 10);
+    let genome = genome();
+    bencher
+        .counter(ItemsCount::new(500_000_usize))
+        .bench_local(|| evaluator.evaluate(&genome, &trials));
+}
