@@ -18,3 +18,4 @@ pub mod report;
 pub mod run_dir;
 pub mod run_hash;
 pub mod settings;
+pub mod suite;

@@ -98,23 +98,33 @@ impl RunDir {
         if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
             fs::create_dir_all(parent).map_err(FileError::at(parent))?;
         }
-        match fs::create_dir(path) {
-            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
-                return Err(RunDirError::Exists(path.to_owned()));
-            }
-            other => other.map_err(FileError::at(path))?,
+        if path.exists() {
+            return Err(RunDirError::Exists(path.to_owned()));
         }
+        let part = part_beside(path);
+        remove_abandoned_parts(path);
+        fs::create_dir(&part).map_err(FileError::at(&part))?;
         let settings_text = toml::to_string(&experiment.settings().written)
             .expect("settings are plain numbers and strings");
-        let run = Self {
-            path: path.to_owned(),
+        let mut run = Self {
+            _lock: lock(&part)?,
+            path: part.clone(),
             settings_text,
-            _lock: lock(path)?,
         };
         run.save(experiment)?;
         let meta = tables::meta(experiment.settings());
         files::replace(&run.file(META), meta.as_bytes())?;
         files::replace(&run.file(CONFIG), run.settings_text.as_bytes())?;
+        // Under its own name from here on, complete: a directory of that name is always a run.
+        if let Err(error) = fs::rename(&part, path) {
+            let _ = fs::remove_dir_all(&part);
+            return Err(if path.exists() {
+                RunDirError::Exists(path.to_owned())
+            } else {
+                FileError::at(path)(error).into()
+            });
+        }
+        run.path = path.to_owned();
         Ok(run)
     }
 
@@ -221,6 +231,32 @@ impl RunDir {
 
     fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
+    }
+}
+
+/// Where a directory is made before it gets its name: beside it, under this process's number.
+fn part_beside(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!(".{name}.{}.part", std::process::id()))
+}
+
+/// Removes what processes left behind that ended while they made this directory. What another one
+/// is still making is locked.
+fn remove_abandoned_parts(path: &Path) {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let start = format!(".{name}.");
+    let parent = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let is_part = name.starts_with(&start) && name.ends_with(".part");
+        if is_part && matches!(lock(&entry.path()), Ok(Some(_))) {
+            // It is only in the way of the eye.
+            let _ = fs::remove_dir_all(entry.path());
+        }
     }
 }
 
