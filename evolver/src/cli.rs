@@ -9,6 +9,7 @@ use crate::commands::evolve::{EvolveArgs, evolve};
 use crate::commands::export::{ExportArgs, export};
 use crate::commands::import::{ImportArgs, import};
 use crate::commands::inspect::inspect;
+use crate::commands::suite::{SuiteArgs, TaskArgs, Verb, paper, run_task, suite};
 use crate::run_dir::RunDirError;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::PathBuf;
@@ -58,6 +59,15 @@ enum Command {
         /// The genome file.
         genome: PathBuf,
     },
+    /// The experiments of the paper: all its evolutions, one after the other or on a cluster.
+    Paper {
+        #[command(subcommand)]
+        verb: Verb,
+    },
+    /// The same for a suite of one's own, described in a TOML file.
+    Suite(SuiteArgs),
+    /// Do a share of a suite's runs: what a task of a cluster, or of GNU parallel, does.
+    RunTask(TaskArgs),
     /// Print a completion script for a shell.
     Completions {
         /// The shell.
@@ -79,6 +89,9 @@ pub fn main() -> ExitCode {
         Some(Command::Export(arguments)) => export(&arguments).map(done),
         Some(Command::Import(arguments)) => import(&arguments).map(done),
         Some(Command::Inspect { genome }) => inspect(&genome).map(done),
+        Some(Command::Paper { verb }) => paper(&verb),
+        Some(Command::Suite(arguments)) => suite(&arguments),
+        Some(Command::RunTask(arguments)) => run_task(&arguments),
         Some(Command::Completions { shell }) => {
             let mut stdout = std::io::stdout();
             clap_complete::generate(shell, &mut Cli::command(), "evolver", &mut stdout);

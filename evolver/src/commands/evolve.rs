@@ -214,7 +214,7 @@ fn generations(
 
 /// The first Ctrl-C asks for an end after this generation, the second ends at once; both leave a
 /// run that can be resumed.
-fn stop_on_ctrl_c() -> Result<Arc<AtomicBool>, ctrlc::Error> {
+pub(super) fn stop_on_ctrl_c() -> Result<Arc<AtomicBool>, ctrlc::Error> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
     ctrlc::set_handler(move || {

@@ -8,6 +8,7 @@ pub mod evolve;
 pub mod export;
 pub mod import;
 pub mod inspect;
+pub mod suite;
 
 /// Input that cannot be used, in one message.
 #[derive(Debug, thiserror::Error)]

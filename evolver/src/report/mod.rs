@@ -3,6 +3,7 @@
 pub mod progress;
 pub mod reevaluation;
 pub mod structures;
+pub mod suite_progress;
 pub mod summary;
 pub mod tables;
 

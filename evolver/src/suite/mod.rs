@@ -15,6 +15,7 @@
 //! ```
 
 pub mod plan;
+pub mod slurm;
 pub mod work;
 
 use serde::Deserialize;

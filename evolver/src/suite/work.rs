@@ -37,6 +37,15 @@ impl Shard {
         }
     }
 
+    /// Where the hashes of the share's runs are written once all are done.
+    #[must_use]
+    pub fn hashes_file(self) -> String {
+        match self.of {
+            1 => "hashes.txt".to_owned(),
+            of => format!("hashes-{}-of-{of}.txt", self.index),
+        }
+    }
+
     /// The runs of this share.
     #[must_use]
     pub fn of_plan(self, plan: &Plan) -> Vec<&PlannedRun> {

@@ -1,0 +1,155 @@
+//! Progress of a suite: suite, experiment and run level, with the time left by what was measured.
+
+use super::progress::{ProgressMode, seconds};
+use crate::suite::plan::{Plan, PlannedRun};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+/// Shows the progress of the runs of one process.
+#[derive(Debug)]
+pub struct SuiteProgress {
+    shown: Shown,
+    started: Instant,
+    /// Label of each run: its experiment and settings.
+    labels: BTreeMap<String, String>,
+    runs: usize,
+    done_before: usize,
+    /// Runs completed, and robot-steps worked and to be worked, by this process.
+    completed: Cell<usize>,
+    worked: Cell<u64>,
+    to_work: u64,
+}
+
+#[derive(Debug)]
+enum Shown {
+    Bar(ProgressBar),
+    Lines,
+    Json,
+    Nothing,
+}
+
+impl SuiteProgress {
+    /// Starts the clock: of these runs, so many are not done.
+    #[must_use]
+    pub fn start(mode: ProgressMode, plan: &Plan, runs: &[&PlannedRun], waiting: usize) -> Self {
+        let mut labels = BTreeMap::new();
+        for experiment in &plan.experiments {
+            for settings in &experiment.settings {
+                for run in &settings.runs {
+                    let label =
+                        format!("{}: {}, seed {}", experiment.name, settings.label, run.seed);
+                    labels.entry(run.id.clone()).or_insert(label);
+                }
+            }
+        }
+        let terminal = std::io::stderr().is_terminal();
+        let bar = || {
+            let style = ProgressStyle::with_template("{bar:30} {pos}/{len} runs  {msg}")
+                .expect("the template is well-formed");
+            let bar = ProgressBar::new(runs.len() as u64).with_style(style);
+            bar.set_position((runs.len() - waiting) as u64);
+            bar.enable_steady_tick(Duration::from_millis(200));
+            Shown::Bar(bar)
+        };
+        let steps_of_a_run = runs.first().map_or(0, |run| robot_steps(run));
+        Self {
+            shown: match mode {
+                ProgressMode::Bar => bar(),
+                ProgressMode::Auto if terminal => bar(),
+                ProgressMode::Auto | ProgressMode::Lines => Shown::Lines,
+                ProgressMode::Json => Shown::Json,
+                ProgressMode::None => Shown::Nothing,
+            },
+            started: Instant::now(),
+            labels,
+            runs: runs.len(),
+            done_before: runs.len() - waiting,
+            completed: Cell::new(0),
+            worked: Cell::new(0),
+            to_work: steps_of_a_run * waiting as u64,
+        }
+    }
+
+    /// A run begins, or is gone on with.
+    pub fn begins(&self, run: &PlannedRun) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.set_message(self.label(run).to_owned());
+        }
+    }
+
+    /// A run has done so many generations.
+    pub fn generation(&self, run: &PlannedRun, generation: u32) {
+        self.worked
+            .set(self.worked.get() + run.settings.robot_steps_per_generation());
+        match &self.shown {
+            Shown::Bar(bar) => bar.set_message(format!(
+                "{}  generation {generation}/{}  {} left",
+                self.label(run),
+                run.settings.generations,
+                seconds(self.left())
+            )),
+            Shown::Json => println!(
+                "{}",
+                serde_json::json!({
+                    "event": "generation",
+                    "run": run.id,
+                    "label": self.label(run),
+                    "generation": generation,
+                    "generations": run.settings.generations,
+                })
+            ),
+            Shown::Lines | Shown::Nothing => {}
+        }
+    }
+
+    /// A run is complete.
+    pub fn completed(&self, run: &PlannedRun) {
+        self.completed.set(self.completed.get() + 1);
+        let done = self.done_before + self.completed.get();
+        match &self.shown {
+            Shown::Bar(bar) => bar.set_position(done as u64),
+            Shown::Lines => eprintln!(
+                "{done}/{} runs  {}  {} left",
+                self.runs,
+                self.label(run),
+                seconds(self.left())
+            ),
+            Shown::Json => println!(
+                "{}",
+                serde_json::json!({
+                    "event": "run",
+                    "run": run.id,
+                    "label": self.label(run),
+                    "runs_done": done,
+                    "runs": self.runs,
+                    "seconds_left": self.left().as_secs_f64(),
+                })
+            ),
+            Shown::Nothing => {}
+        }
+    }
+
+    /// Clears the bar.
+    pub fn end(&self) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn label(&self, run: &PlannedRun) -> &str {
+        self.labels.get(&run.id).map_or("", String::as_str)
+    }
+
+    fn left(&self) -> Duration {
+        let worked = self.worked.get().max(1);
+        let left = self.to_work.saturating_sub(worked) as f64 / worked as f64;
+        self.started.elapsed().mul_f64(left)
+    }
+}
+
+fn robot_steps(run: &PlannedRun) -> u64 {
+    run.settings.robot_steps_per_generation() * u64::from(run.settings.generations)
+}
