@@ -55,6 +55,11 @@ impl Recording {
         }
     }
 
+    /// All blocks, robot after robot.
+    pub(super) fn words(&self) -> &[u64] {
+        &self.words
+    }
+
     /// The same for some robots in a row.
     fn of_robots(&mut self, first: usize, robots: usize) -> &mut [u64] {
         &mut self.words[first * self.blocks..][..robots * self.blocks]
