@@ -74,3 +74,42 @@ impl ActionTable {
         u32::from(*entry) << ENTRY_SHIFT
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::window::ACTION_BIT;
+    use super::*;
+    use crate::seed::{Purpose, SeedTree};
+    use minimal_surprise_controller::{Genome, Topology};
+    use rand_core::Rng as _;
+
+    #[test]
+    fn all_windows_of_random_genomes_are_decided_as_the_controller_decides() {
+        for (seed, topology) in (0..).zip(Topology::ALL) {
+            let mut rng = SeedTree::new(seed).stream(Purpose::InitialGenome, 0, 0);
+            let weights: Vec<i16> = (0..topology.weights())
+                .map(|_| ((rng.next_u32() as i16) >> (3 * (seed % 3))).max(-32767))
+                .collect();
+            let controller = Controller::new(&Genome::from_weights(topology, &weights).unwrap());
+            let order = WindowOrder::new(topology.model());
+            for path in Path::available() {
+                let mut table = ActionTable::new();
+                table.prepare(path, &controller, &order);
+                for window in 0..WINDOWS as u16 {
+                    let (reading, last_action) = order.reading(window);
+                    let (action, turn) = controller.decide(reading, last_action);
+                    assert_eq!(
+                        table.get(
+                            order.window(reading.bits()) | window & ACTION_BIT,
+                            &order,
+                            &controller
+                        ) >> ENTRY_SHIFT,
+                        u32::from(to_entry(action, turn)),
+                        "seed {seed}, {topology:?}, window {window:015b}, path {}",
+                        path.name()
+                    );
+                }
+            }
+        }
+    }
+}

@@ -54,22 +54,28 @@ impl Plane {
         self.lines
     }
 
+    /// Word and bit of a cell. `ONE_WORD`: lines are known to be single words.
     #[inline]
-    fn place(&self, line: u32, along: u32) -> (usize, u32) {
+    fn place<const ONE_WORD: bool>(&self, line: u32, along: u32) -> (usize, u32) {
         let bit = along + BORDER;
-        let word = (line as usize + 1) * self.words_per_line + (bit / 32) as usize;
+        let line = line as usize + 1;
+        let word = if ONE_WORD {
+            line
+        } else {
+            line * self.words_per_line + (bit / 32) as usize
+        };
         (word, 1 << (bit % 32))
     }
 
     #[inline]
-    fn flip(&mut self, line: u32, along: u32) {
-        let (word, mask) = self.place(line, along);
+    fn flip<const ONE_WORD: bool>(&mut self, line: u32, along: u32) {
+        let (word, mask) = self.place::<ONE_WORD>(line, along);
         self.bits[word] ^= mask;
     }
 
     #[inline]
-    fn occupied(&self, line: u32, along: u32) -> bool {
-        let (word, mask) = self.place(line, along);
+    fn occupied<const ONE_WORD: bool>(&self, line: u32, along: u32) -> bool {
+        let (word, mask) = self.place::<ONE_WORD>(line, along);
         self.bits[word] & mask != 0
     }
 
@@ -137,11 +143,16 @@ impl Board {
         self.width.max(self.height) <= Plane::SIDE_MAX_ONE_WORD
     }
 
-    /// Puts a robot on the cell or takes it away. Borders stay as they are.
+    /// Puts a robot on an empty board. Borders stay as they are.
+    pub(super) fn place(&mut self, robot: u32) {
+        self.flip::<false>(robot_word::x(robot), robot_word::y(robot));
+    }
+
+    /// Puts a robot on the cell or takes it away.
     #[inline]
-    pub(super) fn flip(&mut self, x: u32, y: u32) {
-        self.rows.flip(y, x);
-        self.columns.flip(self.width - 1 - x, y);
+    fn flip<const ONE_WORD: bool>(&mut self, x: u32, y: u32) {
+        self.rows.flip::<ONE_WORD>(y, x);
+        self.columns.flip::<ONE_WORD>(self.width - 1 - x, y);
     }
 
     pub(super) fn close_edges(&mut self) {
@@ -166,22 +177,35 @@ impl Board {
         }
     }
 
-    /// Moves a robot one cell ahead unless the cell is taken. Borders stay as they are.
-    #[inline]
-    pub(super) fn advance(&mut self, robot: &mut u32) {
-        let (x, y) = (robot_word::x(*robot), robot_word::y(*robot));
-        // Headings are too mixed for branches to be foreseen.
-        let heading = robot_word::heading(*robot) as usize;
+    /// Moves each of the robots listed one cell ahead unless the cell is taken, one after the
+    /// other. Borders stay as they are.
+    pub(super) fn advance(&mut self, movers: &[u32], robots: &mut [u32]) {
+        if self.is_narrow() {
+            self.advance_each::<true>(movers, robots);
+        } else {
+            self.advance_each::<false>(movers, robots);
+        }
+    }
+
+    fn advance_each<const ONE_WORD: bool>(&mut self, movers: &[u32], robots: &mut [u32]) {
+        // Headings are too mixed for branches to be foreseen, so there is none on them.
+        static AHEAD: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
+        let (width, height) = (self.width, self.height);
         let across_the_edge = |to: u32, side: u32| {
             let to = if to == side { 0 } else { to };
             if to == u32::MAX { side - 1 } else { to }
         };
-        let to_x = across_the_edge(x.wrapping_add_signed([1, 0, -1, 0][heading]), self.width);
-        let to_y = across_the_edge(y.wrapping_add_signed([0, 1, 0, -1][heading]), self.height);
-        if !self.rows.occupied(to_y, to_x) {
-            self.flip(x, y);
-            self.flip(to_x, to_y);
-            *robot = *robot & !robot_word::POSITION | robot_word::position(to_x, to_y);
+        for &mover in movers {
+            let robot = &mut robots[mover as usize];
+            let (x, y) = (robot_word::x(*robot), robot_word::y(*robot));
+            let (ahead_x, ahead_y) = AHEAD[robot_word::heading(*robot) as usize];
+            let to_x = across_the_edge(x.wrapping_add_signed(ahead_x), width);
+            let to_y = across_the_edge(y.wrapping_add_signed(ahead_y), height);
+            if !self.rows.occupied::<ONE_WORD>(to_y, to_x) {
+                self.flip::<ONE_WORD>(x, y);
+                self.flip::<ONE_WORD>(to_x, to_y);
+                *robot = *robot & !robot_word::POSITION | robot_word::position(to_x, to_y);
+            }
         }
     }
 }

@@ -15,6 +15,14 @@
 //! | large or noisy swarms in parts that stay in the cache | `every_step` |
 //!
 //! `evaluator` puts them together, and `path` chooses the instructions.
+#![cfg_attr(
+    not(target_arch = "x86_64"),
+    allow(
+        dead_code,
+        unused_variables,
+        reason = "some is for the vector paths only"
+    )
+)]
 
 mod actions;
 mod board;

@@ -36,6 +36,30 @@ impl Recording {
         &self.words[robot * self.blocks..][..self.blocks]
     }
 
+    /// Fills the blocks of some robots from `block` on with what they have `period` blocks before.
+    fn repeat(&mut self, first: usize, robots: usize, block: usize, period: usize) {
+        let blocks = self.blocks;
+        for words in self.of_robots(first, robots).chunks_exact_mut(blocks) {
+            if period == 1 {
+                let (before, after) = words.split_at_mut(block);
+                after.fill(before[block - 1]);
+                continue;
+            }
+            let from = block - period;
+            let mut filled = block;
+            while filled < blocks {
+                let count = (filled - from).min(blocks - filled);
+                words.copy_within(from..from + count, filled);
+                filled += count;
+            }
+        }
+    }
+
+    /// All blocks, robot after robot.
+    pub(super) fn words(&self) -> &[u64] {
+        &self.words
+    }
+
     /// The same for some robots in a row.
     fn of_robots(&mut self, first: usize, robots: usize) -> &mut [u64] {
         &mut self.words[first * self.blocks..][..robots * self.blocks]
@@ -75,11 +99,7 @@ impl Recorder {
         for block in 0..blocks {
             if let Some(earlier) = self.history.find_or_add(swarm.state()) {
                 let period = block - earlier;
-                for words in recording.of_robots(first, robots).chunks_exact_mut(blocks) {
-                    for block in block..blocks {
-                        words[block] = words[block - period];
-                    }
-                }
+                recording.repeat(first, robots, block, period);
                 return;
             }
             let in_block = BLOCK_STEPS.min(steps - block * BLOCK_STEPS);

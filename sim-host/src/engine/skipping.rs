@@ -15,64 +15,141 @@ pub(super) fn count_matches(
     steps: usize,
     mut add: impl FnMut(usize, u64),
 ) {
+    let words = recording.words();
     let whole_blocks = steps / BLOCK_STEPS;
-    let mut waiting = 0..recording.robots();
+    let last_steps = steps % BLOCK_STEPS;
     let mut lanes = Lanes::at_start();
     let mut matches = Matches::default();
-    let mut robot = [0; LANES];
-    let mut block = [0; LANES];
-    let mut matched = [0_u64; LANES];
-    let mut busy = 0_u32;
+    let mut places = [Place::default(); LANES];
     let mut next = Blocks {
         inputs: [0; LANES],
         starting: 0,
-        first_steps: steps % BLOCK_STEPS,
+        first_steps: last_steps,
     };
-    for (lane, first) in waiting.by_ref().take(LANES).enumerate() {
-        robot[lane] = first;
-        next.inputs[lane] = recording.of_robot(first)[0];
-        busy |= 1 << lane;
+    // Lanes that have a robot, and those of them whose next block is their last and not whole.
+    let (mut busy, mut ending) = (0_u32, 0_u32);
+    // Robots are taken in turn; whoever comes first takes the first.
+    let mut waiting = 0..recording.robots();
+    let mut take = |place: &mut Place| {
+        let robot = waiting.next()?;
+        let word = robot * recording.blocks();
+        *place = Place {
+            robot,
+            word,
+            end: word + whole_blocks,
+            matched: 0,
+        };
+        Some(words[word])
+    };
+    for (lane, place) in places.iter_mut().enumerate() {
+        if let Some(inputs) = take(place) {
+            next.inputs[lane] = inputs;
+            busy |= 1 << lane;
+        }
     }
     next.starting = busy;
+    if whole_blocks == 0 {
+        ending = busy;
+    }
     while busy != 0 {
         // A robot's first prediction is not made by its network, so its first block stands alone.
         let unchanged = predictor.run_block(&mut lanes, &next, &mut matches) & !next.starting;
         next.starting = 0;
-        let now_busy = busy;
-        for lane in (0..LANES).filter(|lane| now_busy >> lane & 1 == 1) {
-            let blocks = recording.of_robot(robot[lane]);
-            if block[lane] == whole_blocks {
-                matched[lane] += u64::from(matches.first_steps[lane]);
-                block[lane] += 1;
+
+        // What every lane does: count, and go on to the next block.
+        let (mut at_end, mut alike) = (0, 0);
+        for (lane, place) in places.iter_mut().enumerate() {
+            place.matched += u64::from(matches.block[lane]);
+            place.word += 1;
+            at_end |= u32::from(place.word >= place.end) << lane;
+            let inputs = words.get(place.word).copied().unwrap_or(0);
+            alike |= u32::from(inputs == next.inputs[lane]) << lane;
+            next.inputs[lane] = inputs;
+        }
+
+        // What some do: skip, or come to the end.
+        for lane in ones(busy & (at_end | unchanged & alike)) {
+            let place = &mut places[lane];
+            if ending >> lane & 1 == 1 {
+                ending ^= 1 << lane;
+                place.matched -= u64::from(matches.block[lane]);
+                place.matched += u64::from(matches.first_steps[lane]);
             } else {
-                let in_block = u64::from(matches.block[lane]);
-                matched[lane] += in_block;
-                block[lane] += 1;
-                if unchanged >> lane & 1 == 1 {
-                    let alike = blocks[block[lane]..whole_blocks]
-                        .iter()
-                        .take_while(|&&inputs| inputs == next.inputs[lane])
-                        .count();
-                    matched[lane] += alike as u64 * in_block;
-                    block[lane] += alike;
+                if place.word < place.end {
+                    let left = &words[place.word..place.end];
+                    let skipped = alike_at_start(left, next.inputs[lane]);
+                    place.matched += skipped as u64 * u64::from(matches.block[lane]);
+                    place.word += skipped;
+                    next.inputs[lane] = words.get(place.word).copied().unwrap_or(0);
+                }
+                if place.word < place.end {
+                    continue;
+                }
+                if last_steps > 0 {
+                    ending |= 1 << lane;
+                    continue;
                 }
             }
-            if let Some(&inputs) = blocks.get(block[lane]) {
-                next.inputs[lane] = inputs;
-                continue;
-            }
-            add(robot[lane], matched[lane]);
-            match waiting.next() {
-                Some(another) => {
-                    robot[lane] = another;
-                    block[lane] = 0;
-                    matched[lane] = 0;
-                    next.inputs[lane] = recording.of_robot(another)[0];
-                    lanes.restart(lane);
+            add(place.robot, place.matched);
+            match take(place) {
+                Some(inputs) => {
+                    next.inputs[lane] = inputs;
                     next.starting |= 1 << lane;
+                    ending |= u32::from(whole_blocks == 0) << lane;
+                    lanes.restart(lane);
                 }
-                None => busy &= !(1 << lane),
+                None => busy ^= 1 << lane,
             }
         }
+    }
+}
+
+/// Where a lane is.
+#[derive(Clone, Copy, Default)]
+struct Place {
+    robot: usize,
+    /// The next block, among all those recorded.
+    word: usize,
+    /// Where the robot's whole blocks end.
+    end: usize,
+    matched: u64,
+}
+
+/// Numbers of the bits that are set.
+fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
+    core::iter::from_fn(move || {
+        let lowest = (bits != 0).then(|| bits.trailing_zeros() as usize);
+        bits &= bits.wrapping_sub(1);
+        lowest
+    })
+}
+
+/// How many blocks at the start are `block`.
+fn alike_at_start(blocks: &[u64], block: u64) -> usize {
+    let (chunks, _) = blocks.as_chunks::<8>();
+    let all_alike = |chunk: &&[u64; 8]| chunk.iter().fold(0, |d, &b| d | (b ^ block)) == 0;
+    let alike = 8 * chunks.iter().take_while(all_alike).count();
+    let rest = blocks[alike..].iter();
+    alike + rest.take_while(|&&b| b == block).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_of_every_length_are_measured() {
+        for length in 0..40 {
+            let mut blocks = vec![7; length];
+            assert_eq!(alike_at_start(&blocks, 7), length);
+            blocks.extend([8, 7, 7]);
+            assert_eq!(alike_at_start(&blocks, 7), length);
+        }
+    }
+
+    #[test]
+    fn ones_are_listed_from_the_lowest() {
+        assert_eq!(ones(0b1001_0010).collect::<Vec<_>>(), [1, 4, 7]);
+        assert_eq!(ones(u32::MAX).count(), 32);
     }
 }

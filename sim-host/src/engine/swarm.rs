@@ -42,7 +42,7 @@ impl Swarm {
         self.words
             .extend(starts.iter().map(|&pose| robot_word::from_pose(pose)));
         for &word in &self.words {
-            self.board.flip(robot_word::x(word), robot_word::y(word));
+            self.board.place(word);
         }
         let padded = self.robots.next_multiple_of(ROBOTS_AT_ONCE);
         self.words.resize(padded, 0);
@@ -86,9 +86,7 @@ impl Swarm {
                 self.sense_and_decide(behaviour, flips, inputs)
             }
         };
-        for &robot in &self.movers[..movers] {
-            self.board.advance(&mut self.words[robot as usize]);
-        }
+        self.board.advance(&self.movers[..movers], &mut self.words);
     }
 
     /// Turns those who turn and lists those who may move; the number of these is returned.
