@@ -46,6 +46,7 @@ component() {
 say 'tools'
 command -v cc >/dev/null || scripts/apt-install.sh gcc libc6-dev
 command -v qemu-system-arm >/dev/null || scripts/apt-install.sh qemu-system-arm
+command -v parallel >/dev/null || scripts/apt-install.sh parallel
 qemu-system-arm --version | head -n 1
 export PROVIDE_TOOLS=1
 targets='thumbv7em-none-eabihf thumbv7em-none-eabi'

@@ -93,6 +93,12 @@ impl Evolver {
         }
     }
 
+    /// The program itself.
+    #[must_use]
+    pub fn program(&self) -> &Path {
+        &self.program
+    }
+
     /// The folder.
     #[must_use]
     pub fn folder(&self) -> &Path {

@@ -1,0 +1,249 @@
+//! Suites, run as a user would run them: one machine or many, interrupted or not, one result.
+
+use rand_chacha::ChaCha8Rng;
+use rand_core::{Rng, SeedableRng};
+use std::process::Command;
+use std::time::Duration;
+use tests::full;
+use tests::program::{Evolver, Finished};
+use tests::tools::{self, Missing};
+
+/// Two settings, three runs each, a moment long.
+const SUITE: &str = "
+name = \"own\"
+
+[[experiment]]
+name = \"two-grids\"
+runs = 3
+grids = [\"9x8\", \"7x9\"]
+robots = [20]
+population = 6
+generations = 25
+repetitions = 2
+steps = 40
+";
+
+const RUN: [&str; 7] = [
+    "suite",
+    "own.toml",
+    "run",
+    "--out",
+    "suite",
+    "--progress",
+    "json",
+];
+
+fn with_the_suite() -> Evolver {
+    let evolver = Evolver::in_empty_folder();
+    evolver.write("own.toml", SUITE.as_bytes());
+    evolver
+}
+
+/// The hashes of an uninterrupted suite.
+fn expected() -> String {
+    let evolver = with_the_suite();
+    let run = evolver.run(&RUN);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    evolver.text("suite/hashes.txt")
+}
+
+/// The hashes of a suite that shares did, in the order of the whole.
+fn hashes_after(evolver: &Evolver) -> String {
+    let run = evolver.run(&RUN);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    evolver.text("suite/hashes.txt")
+}
+
+fn assert_refused(run: &Finished, words: &[&str]) {
+    assert_eq!(run.code, Some(2), "{run:?}");
+    for word in words {
+        assert!(run.stderr.contains(word), "no {word:?} in {run:?}");
+    }
+}
+
+#[test]
+fn kills_at_random_moments_change_no_hash() {
+    let least = if full::all_cases() { 100 } else { 15 };
+    let seed = 6;
+    println!("seed of the moments: {seed}");
+    let mut moments = ChaCha8Rng::seed_from_u64(seed);
+    let expected = expected();
+    let (mut kills, mut suites) = (0, 0);
+    while kills < least {
+        suites += 1;
+        let evolver = with_the_suite();
+        loop {
+            let running = evolver.start(&RUN);
+            std::thread::sleep(Duration::from_micros((moments.next_u32() % 40_000).into()));
+            if running.kill() {
+                break;
+            }
+            kills += 1;
+            assert!(kills < 100_000, "it does not get anywhere");
+        }
+        assert_eq!(hashes_after(&evolver), expected);
+        let parts: Vec<String> = evolver
+            .files()
+            .into_iter()
+            .filter(|f| f.contains(".part"))
+            .collect();
+        assert!(
+            parts.len() <= 2,
+            "abandoned directories are removed: {parts:?}"
+        );
+    }
+    println!("{kills} kills over {suites} suites");
+}
+
+#[test]
+fn threads_shards_and_gnu_parallel_change_no_hash() {
+    let expected = expected();
+    for threads in ["1", "2"] {
+        let evolver = with_the_suite();
+        let run = evolver.run(&[&RUN[..], &["--threads", threads]].concat());
+        assert_eq!(run.code, Some(0), "{run:?}");
+        assert_eq!(
+            evolver.text("suite/hashes.txt"),
+            expected,
+            "{threads} threads"
+        );
+    }
+    let evolver = with_the_suite();
+    for shard in ["2/3", "0/3", "1/3", "1/3"] {
+        let task = [
+            "run-task", "--suite", "own.toml", "--out", "suite", "--shard", shard,
+        ];
+        let run = evolver.run(&task);
+        assert!(run.stdout.contains("2 of 2 runs done"), "{run:?}");
+    }
+    let mut lines: Vec<String> = (0..3)
+        .flat_map(|shard| {
+            let hashes = evolver.text(&format!("suite/hashes-{shard}-of-3.txt"));
+            hashes.lines().map(str::to_owned).collect::<Vec<_>>()
+        })
+        .collect();
+    lines.sort();
+    let mut whole: Vec<&str> = expected.lines().collect();
+    whole.sort_unstable();
+    assert_eq!(lines, whole);
+}
+
+#[test]
+fn gnu_parallel_runs_the_shards() {
+    let found = Command::new("parallel").arg("--version").output();
+    let is_gnu = found.is_ok_and(|output| output.stdout.starts_with(b"GNU parallel"));
+    let tool = if is_gnu {
+        Ok(())
+    } else {
+        Err(Missing(
+            "no GNU parallel: apt-get install parallel".to_owned(),
+        ))
+    };
+    if tools::require(tool).is_none() {
+        return;
+    }
+    let evolver = with_the_suite();
+    let task = "run-task --suite own.toml --out suite --threads 1 --shard {}/4";
+    let output = Command::new("parallel")
+        .args(["--will-cite", "--jobs", "2", "--joblog", "joblog"])
+        .arg(evolver.program())
+        .args(task.split(' '))
+        .args([":::", "0", "1", "2", "3"])
+        .current_dir(evolver.folder())
+        .output()
+        .expect("it has just answered");
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(hashes_after(&evolver), expected());
+}
+
+#[test]
+fn two_processes_share_the_work() {
+    let evolver = with_the_suite();
+    let other = evolver.start(&RUN);
+    let run = evolver.run(&RUN);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    other.wait_for_lines(1000);
+    other.kill();
+    assert_eq!(hashes_after(&evolver), expected());
+}
+
+#[test]
+fn plan_and_status_count_the_runs() {
+    let evolver = with_the_suite();
+    let plan = evolver.run(&["suite", "own.toml", "plan"]);
+    assert!(plan.stdout.contains("6 different runs"), "{plan:?}");
+    let none = evolver.run(&["suite", "own.toml", "status", "--out", "suite"]);
+    assert_eq!(none.stdout.matches("0 of 3 done").count(), 2, "{none:?}");
+    let one = evolver.run(&[&RUN[..], &["--runs", "1"]].concat());
+    assert_eq!(one.code, Some(0), "{one:?}");
+    let status = evolver.run(&["suite", "own.toml", "status", "--out", "suite"]);
+    assert_eq!(
+        status.stdout.matches("1 of 3 done").count(),
+        2,
+        "{status:?}"
+    );
+    let paper = evolver.run(&["paper", "plan"]);
+    assert!(paper.stdout.contains("600 different runs"), "{paper:?}");
+    let times = evolver.run(&["paper", "plan", "--runs-times", "10", "--only", "noise"]);
+    assert!(times.stdout.contains("1200 different runs"), "{times:?}");
+}
+
+#[test]
+fn a_run_of_a_suite_is_the_run_of_its_settings() {
+    let evolver = with_the_suite();
+    let run = evolver.run(&[&RUN[..], &["--runs", "1"]].concat());
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let hashes = evolver.text("suite/hashes.txt");
+    let (id, hash) = hashes.lines().next().unwrap().split_once(' ').unwrap();
+    let config = format!("suite/runs/{id}/config.toml");
+    let again = evolver.run(&["evolve", &config, "--out", "again"]);
+    assert_eq!(again.code, Some(0), "{again:?}");
+    assert_eq!(evolver.text("again/DONE").trim(), hash);
+}
+
+#[test]
+fn bad_suites_are_refused_with_their_place() {
+    let evolver = Evolver::in_empty_folder();
+    let suite = |text: &str| {
+        evolver.write("own.toml", text.as_bytes());
+        evolver.run(&["suite", "own.toml", "run"])
+    };
+    assert_refused(
+        &suite("name = \"own\"\nexperiments = 3\n"),
+        &["own.toml", "line 2", "experiments"],
+    );
+    assert_refused(
+        &suite(&SUITE.replace("9x8", "9x2")),
+        &["two-grids", "9x2", "from 3"],
+    );
+    assert_refused(
+        &suite(&SUITE.replace("runs = 3", "runs = 0")),
+        &["two-grids", "runs = 0"],
+    );
+    assert_refused(
+        &suite(&SUITE.replace("[20]", "[64]")),
+        &["two-grids", "64", "from 1 to 63"],
+    );
+    assert_refused(&suite("name = 3\n"), &["own.toml", "line 1"]);
+    let none = evolver.run(&["suite", "none.toml", "run"]);
+    assert_refused(&none, &["none.toml", "No such file"]);
+    evolver.write("own.toml", SUITE.as_bytes());
+    let only = evolver.run(&["suite", "own.toml", "run", "--only", "three-grids"]);
+    assert_refused(&only, &["--only", "three-grids", "two-grids"]);
+    let shard = ["run-task", "--suite", "own.toml", "--shard", "3/3"];
+    assert_refused(&evolver.run(&shard), &["--shard", "3/3", "i/n"]);
+    assert_refused(
+        &evolver.run(&["run-task", "--shard", "0/3"]),
+        &["--suite", "--out"],
+    );
+    assert_eq!(evolver.files(), ["own.toml"], "nothing was written");
+}
+
+#[test]
+fn a_directory_that_cannot_be_written_is_said_to_be() {
+    let evolver = with_the_suite();
+    evolver.write("suite", b"a file");
+    let run = evolver.run(&RUN);
+    assert_ne!(run.code, Some(0), "{run:?}");
+    assert!(run.stderr.contains("suite"), "{run:?}");
+}
