@@ -5,11 +5,14 @@
 //! [`run_dir`] → [`finished_run`] → [`reevaluation`] → [`report`] → [`commands`] → [`cli`].
 #![forbid(unsafe_code)]
 
+#[macro_use]
+mod output;
 pub mod bench;
 pub mod checkpoint;
 pub mod cli;
 pub mod commands;
 pub mod evolution;
+pub mod evolving;
 pub mod experiment;
 pub mod files;
 pub mod finished_run;

@@ -30,6 +30,13 @@ pub struct RunDir {
     _lock: Option<File>,
 }
 
+/// An evolution between two generations, ready to be written.
+#[derive(Clone, Debug)]
+pub struct Checkpoint {
+    state: Vec<u8>,
+    generations: String,
+}
+
 /// A run directory cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum RunDirError {
@@ -198,10 +205,25 @@ impl RunDir {
     /// # Errors
     /// [`FileError`] if a file cannot be written; the last checkpoint is then still there.
     pub fn save(&self, experiment: &Experiment) -> Result<(), FileError> {
-        let bytes = checkpoint::encode(experiment, &self.settings_text);
-        files::replace(&self.file(CHECKPOINT), &bytes)?;
-        let table = tables::generations(experiment);
-        files::replace(&self.file(GENERATIONS), table.as_bytes())
+        self.write(&self.checkpoint(experiment))
+    }
+
+    /// What [`RunDir::save`] writes.
+    #[must_use]
+    pub fn checkpoint(&self, experiment: &Experiment) -> Checkpoint {
+        Checkpoint {
+            state: checkpoint::encode(experiment, &self.settings_text),
+            generations: tables::generations(experiment),
+        }
+    }
+
+    /// Writes a checkpoint.
+    ///
+    /// # Errors
+    /// [`FileError`] if a file cannot be written; the last checkpoint is then still there.
+    pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), FileError> {
+        files::replace(&self.file(CHECKPOINT), &checkpoint.state)?;
+        files::replace(&self.file(GENERATIONS), checkpoint.generations.as_bytes())
     }
 
     /// Saves the result and marks the run complete.

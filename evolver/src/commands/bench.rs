@@ -16,9 +16,9 @@ pub fn bench(json: bool) -> anyhow::Result<()> {
         }
     })?;
     if json {
-        println!("{}", serde_json::to_string(&report)?);
+        show_line!("{}", serde_json::to_string(&report)?);
     } else {
-        println!("{}", text(&report, path));
+        show_line!("{}", text(&report, path));
     }
     Ok(())
 }

@@ -32,9 +32,9 @@ pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
         measures: measures.as_ref(),
     };
     if json {
-        println!("{}", structures::json(&classified));
+        show_line!("{}", structures::json(&classified));
     } else {
-        print!("{}", structures::text(&classified));
+        show!("{}", structures::text(&classified));
     }
     Ok(())
 }

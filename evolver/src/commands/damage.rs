@@ -86,9 +86,9 @@ pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
         .install(|| resilience(&finished, structure, damage, repeat))
         .map_err(|error| about_area(&error))?;
     if arguments.json {
-        println!("{}", resilience_json(structure, &rows));
+        show_line!("{}", resilience_json(structure, &rows));
     } else {
-        println!("{}", resilience_text(structure, &rows));
+        show_line!("{}", resilience_text(structure, &rows));
     }
     Ok(())
 }

@@ -115,9 +115,9 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
             .collect::<anyhow::Result<Vec<_>>>()
     })?;
     if arguments.json {
-        println!("{}", conditions_json(&conditions, seed));
+        show_line!("{}", conditions_json(&conditions, seed));
     } else {
-        println!(
+        show_line!(
             "{path}: {starts} new starts of {steps} steps each, seed {seed}\n\n{}",
             conditions_text(&conditions)
         );

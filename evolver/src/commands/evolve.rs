@@ -1,6 +1,7 @@
 //! `evolver evolve`: evolve a swarm, or go on with a run.
 
 use super::{BadInput, thread_pool};
+use crate::evolving::until_finished;
 use crate::experiment::Experiment;
 use crate::report::progress::{Progress, ProgressMode};
 use crate::report::summary;
@@ -149,14 +150,14 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
         Some(directory) => match RunDir::open(directory)? {
             Found::Unfinished(experiment, run) => (*experiment, run),
             Found::Finished(hash) => {
-                println!("{} is complete; its hash is {hash}", directory.display());
+                show_line!("{} is complete; its hash is {hash}", directory.display());
                 return Ok(ExitCode::SUCCESS);
             }
         },
         None => {
             let settings = Settings::resolve(&given, rand::random).map_err(BadInput::new)?;
             if given.place("seed").is_none() && arguments.progress != ProgressMode::Json {
-                println!("seed {} (drawn)", settings.seed);
+                show_line!("seed {} (drawn)", settings.seed);
             }
             let experiment = Experiment::new(settings);
             let run = match settings::out(&given) {
@@ -180,17 +181,16 @@ fn generations(
 ) -> anyhow::Result<ExitCode> {
     let done = experiment.history().len() as u32;
     let progress = Progress::start(manner.progress, experiment.settings(), done);
-    while !experiment.is_finished() {
-        if stop.load(Ordering::Relaxed) {
-            progress.end();
-            let program = summary::program();
-            let directory = run.path().display();
-            eprintln!("interrupted; go on with: {program} evolve --resume {directory}");
-            return Ok(ExitCode::from(EXIT_INTERRUPTED));
-        }
-        let record = experiment.advance(manner.engine, manner.path);
-        run.save(&experiment)?;
-        progress.generation(&record);
+    let how = (manner.engine, manner.path);
+    let finished = until_finished(&mut experiment, run, how, stop, |record| {
+        progress.generation(record);
+    })?;
+    if !finished {
+        progress.end();
+        let program = summary::program();
+        let directory = run.path().display();
+        eprintln!("interrupted; go on with: {program} evolve --resume {directory}");
+        return Ok(ExitCode::from(EXIT_INTERRUPTED));
     }
     progress.end();
     let finding = experiment
@@ -205,9 +205,9 @@ fn generations(
             "hash": finding.hash.to_string(),
             "run": run.path(),
         });
-        println!("{done}");
+        show_line!("{done}");
     } else {
-        print!("\n{}", summary::evolved(&experiment, &finding, run.path()));
+        show!("\n{}", summary::evolved(&experiment, &finding, run.path()));
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -44,7 +44,7 @@ pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
         }
     };
     match &arguments.out {
-        None => std::io::stdout().write_all(&text)?,
+        None => show!("{}", String::from_utf8_lossy(&text)),
         Some(path) => {
             let mut file = OpenOptions::new()
                 .write(true)

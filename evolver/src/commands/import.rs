@@ -91,7 +91,7 @@ pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
         }
         Ok(()) => write(&arguments.out, &imported)?,
     }
-    print!("{}", report(topology, &arguments.out, &imported));
+    show!("{}", report(topology, &arguments.out, &imported));
     Ok(())
 }
 

@@ -14,6 +14,6 @@ pub fn inspect(path: &Path) -> anyhow::Result<()> {
     let bytes = files::read(path).map_err(BadInput::new)?;
     let encoded = EncodedGenome::decode(&bytes)
         .map_err(|error| BadInput::new(format!("{}: {error}", path.display())))?;
-    print!("{}", summary::genome(&encoded, bytes.len()));
+    show!("{}", summary::genome(&encoded, bytes.len()));
     Ok(())
 }

@@ -206,9 +206,9 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
                 flags: flags(choice),
             };
             if *dry_run {
-                print!("{}", job.script());
+                show!("{}", job.script());
             } else {
-                println!("{}", job.submit(&read.text)?);
+                show_line!("{}", job.submit(&read.text)?);
             }
         }
     }
@@ -256,9 +256,9 @@ fn directory(suite: &Suite, choice: &Choice) -> PathBuf {
 
 fn print_plan(plan: &Plan) {
     for experiment in &plan.experiments {
-        println!("{}", experiment.name);
+        show_line!("{}", experiment.name);
         for settings in &experiment.settings {
-            println!("  {:<40} {:>4} runs", settings.label, settings.runs.len());
+            show_line!("  {:<40} {:>4} runs", settings.label, settings.runs.len());
         }
     }
     let runs = plan.runs();
@@ -266,7 +266,7 @@ fn print_plan(plan: &Plan) {
         .iter()
         .map(|run| run.settings.robot_steps_per_generation() * u64::from(run.settings.generations))
         .sum();
-    println!(
+    show_line!(
         "\n{} different runs, {:.1} billion robot-steps",
         runs.len(),
         robot_steps as f64 / 1e9
@@ -275,14 +275,14 @@ fn print_plan(plan: &Plan) {
 
 fn print_status(plan: &Plan, directory: &Path) {
     for experiment in &plan.experiments {
-        println!("{}", experiment.name);
+        show_line!("{}", experiment.name);
         for settings in &experiment.settings {
             let of = |state| {
                 let runs = settings.runs.iter();
                 runs.filter(|run| progress(run, directory) == state).count()
             };
             let (done, begun) = (of(Progress::Done), of(Progress::Begun));
-            println!(
+            show_line!(
                 "  {:<40} {done:>4} of {} done, {begun} begun",
                 settings.label,
                 settings.runs.len()
@@ -306,7 +306,7 @@ fn run(plan: &Plan, shard: Shard, directory: &Path, manner: &Manner) -> anyhow::
     };
     let done = runs.len() - waiting(&runs, directory).len();
     if manner.progress == ProgressMode::Json {
-        println!(
+        show_line!(
             "{}",
             serde_json::json!({"event": "done", "runs_done": done, "runs": runs.len()})
         );
@@ -315,7 +315,7 @@ fn run(plan: &Plan, shard: Shard, directory: &Path, manner: &Manner) -> anyhow::
             0 => String::new(),
             n => format!("; {n} are being worked on by another process"),
         };
-        println!(
+        show_line!(
             "{done} of {} runs done in {}{others}",
             runs.len(),
             directory.display()

@@ -91,7 +91,7 @@ impl Progress {
                 self.generations,
                 seconds(left)
             ),
-            Shown::Json => println!(
+            Shown::Json => show_line!(
                 "{}",
                 serde_json::json!({
                     "event": "generation",

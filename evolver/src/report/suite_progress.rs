@@ -91,7 +91,7 @@ impl SuiteProgress {
                 run.settings.generations,
                 seconds(self.left())
             )),
-            Shown::Json => println!(
+            Shown::Json => show_line!(
                 "{}",
                 serde_json::json!({
                     "event": "generation",
@@ -117,7 +117,7 @@ impl SuiteProgress {
                 self.label(run),
                 seconds(self.left())
             ),
-            Shown::Json => println!(
+            Shown::Json => show_line!(
                 "{}",
                 serde_json::json!({
                     "event": "run",

@@ -4,11 +4,12 @@
 //! Any number of processes may work on the same plan; each takes runs that no other holds.
 
 use super::plan::{Plan, PlannedRun};
+use crate::evolving::until_finished;
 use crate::experiment::Experiment;
 use crate::run_dir::{Found, RunDir, RunDirError};
 use minimal_surprise_sim::{Engine, Path as CodePath};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// A share of the runs: every n-th from the i-th on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,13 +110,17 @@ pub fn work_on(
         Err(error) => return Err(error),
     };
     let path = CodePath::from_environment().unwrap_or_else(|_| CodePath::best());
-    while !experiment.is_finished() {
-        if stop.load(Ordering::Relaxed) {
-            return Ok(Worked::Interrupted);
-        }
-        experiment.advance(Engine::Fast, path);
-        held.save(&experiment)?;
-        each_generation(experiment.history().len() as u32);
+    let finished = until_finished(
+        &mut experiment,
+        &held,
+        (Engine::Fast, path),
+        stop,
+        |record| {
+            each_generation(record.generation + 1);
+        },
+    )?;
+    if !finished {
+        return Ok(Worked::Interrupted);
     }
     let finding = experiment
         .finding()

@@ -1,0 +1,44 @@
+//! Evolving with a checkpoint after every generation, written while the next one is evaluated.
+
+use crate::experiment::{Experiment, GenerationRecord};
+use crate::files::FileError;
+use crate::run_dir::RunDir;
+use minimal_surprise_sim::{Engine, Path};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, ScopedJoinHandle};
+
+/// Evaluates the generations that are left, saving each; false if it was asked to stop before the
+/// last one. When this returns, everything evaluated is saved.
+///
+/// # Errors
+/// [`FileError`] if a generation cannot be saved; the last checkpoint is then still there.
+pub fn until_finished(
+    experiment: &mut Experiment,
+    run: &RunDir,
+    (engine, path): (Engine, Path),
+    stop: &AtomicBool,
+    mut each_generation: impl FnMut(&GenerationRecord),
+) -> Result<bool, FileError> {
+    thread::scope(|scope| {
+        let mut saving = None;
+        while !experiment.is_finished() {
+            if stop.load(Ordering::Relaxed) {
+                finish(saving)?;
+                return Ok(false);
+            }
+            let record = experiment.advance(engine, path);
+            finish(saving)?;
+            let checkpoint = run.checkpoint(experiment);
+            saving = Some(scope.spawn(move || run.write(&checkpoint)));
+            each_generation(&record);
+        }
+        finish(saving)?;
+        Ok(true)
+    })
+}
+
+fn finish(saving: Option<ScopedJoinHandle<'_, Result<(), FileError>>>) -> Result<(), FileError> {
+    saving.map_or(Ok(()), |saving| {
+        saving.join().expect("saving does not panic")
+    })
+}
