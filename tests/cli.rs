@@ -489,3 +489,93 @@ fn completions_are_printed_for_every_shell() {
         assert!(printed.stdout.contains("sensor-model"), "{shell}");
     }
 }
+
+#[test]
+fn names_in_files_stand_as_they_are_and_numbers_are_decimal() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.write("swarm.toml", b"out = \"my_run\"\nsteps = 2_0\n");
+    let arguments = [
+        &["evolve", "swarm.toml"],
+        &short_flags_without("--steps")[..],
+    ]
+    .concat();
+    let run = evolver.run(&arguments);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    assert!(evolver.text("my_run/config.toml").contains("steps = 20\n"));
+    let from = short(&["--from", "my_run/best.genome", "--out", "next_run"]);
+    assert_eq!(evolver.run(&from).code, Some(0));
+    let again = evolver.run(&["evolve", "next_run/config.toml", "--out", "third_run"]);
+    assert_eq!(again.code, Some(0), "{again:?}");
+    evolver.write("hex.toml", b"robots = 0x10\n");
+    let words = ["hex.toml, line 1", "decimal"];
+    assert_refused(&evolver, &["evolve".into(), "hex.toml".into()], &words);
+}
+
+fn short_flags_without(flag: &str) -> Vec<&'static str> {
+    SHORT
+        .iter()
+        .filter(|(name, _)| *name != flag)
+        .flat_map(|&(name, value)| [name, value])
+        .collect()
+}
+
+#[test]
+fn a_directory_is_a_run_as_soon_as_it_has_its_name() {
+    let evolver = Evolver::in_empty_folder();
+    let mut resumed = 0;
+    for wait_us in (0..60).map(|try_| 500 * try_) {
+        let name = format!("run-{wait_us}");
+        let running = evolver.start(&short(&["--generations", "100000", "--out", &name]));
+        std::thread::sleep(Duration::from_micros(wait_us));
+        running.kill();
+        if evolver.folder().join(&name).is_dir() {
+            let going_on = evolver.start(&["evolve", "--resume", &name]);
+            going_on.wait_for_lines(3);
+            going_on.kill();
+            let generations = evolver.text(&format!("{name}/generations.csv"));
+            assert!(generations.lines().count() > 1, "{name} went on");
+            resumed += 1;
+        }
+    }
+    println!("{resumed} of 60 killed at their beginning had begun and went on");
+    assert!(resumed > 0);
+}
+
+#[test]
+fn a_reader_that_goes_is_no_error() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.run(&short(&["--seed", "1", "--out", "run"]));
+    for command in [
+        "classify run --json",
+        "inspect run/best.genome",
+        "paper plan",
+    ] {
+        let line = format!("{} {command} | head -c 5", evolver.program().display());
+        let piped = std::process::Command::new("sh")
+            .args(["-c", &line])
+            .current_dir(evolver.folder())
+            .output()
+            .unwrap();
+        assert_eq!(piped.stdout.len(), 5);
+        assert_eq!(String::from_utf8_lossy(&piped.stderr), "", "{command}");
+    }
+}
+
+#[test]
+fn commands_that_are_shown_can_be_copied_whatever_the_name() {
+    let evolver = Evolver::in_empty_folder();
+    let run = evolver.run(&short(&["--seed", "1", "--out", "it's my run"]));
+    let hint = run
+        .stdout
+        .lines()
+        .find(|line| line.contains("classify"))
+        .unwrap();
+    let command = hint.split_once("evolver").unwrap().1;
+    let line = format!("{}{command}", evolver.program().display());
+    let copied = std::process::Command::new("sh")
+        .args(["-c", &line])
+        .current_dir(evolver.folder())
+        .output()
+        .unwrap();
+    assert!(copied.status.success(), "{copied:?}");
+}

@@ -142,7 +142,7 @@ fn states_that_cannot_be_are_refused_with_their_line() {
     evolver.write("swarm.txt", "···\n·x·\n···\n".as_bytes());
     assert_refused(
         &evolver.run(&["classify", "swarm.txt"]),
-        &["swarm.txt", "row 1", "'x'"],
+        &["swarm.txt", "line 2", "'x'"],
     );
     assert_refused(
         &evolver.run(&["classify", "none"]),
@@ -168,6 +168,8 @@ fn final_states_that_cannot_be_are_refused() {
     assert_refused(&refused, &["final.json", "robot 0", "outside"]);
     let refused = with(&|state| state["final"][0][2] = 4.into());
     assert_refused(&refused, &["final.json", "heading 4", "line 1"]);
+    let refused = with(&|state| state["final"] = serde_json::json!([]));
+    assert_refused(&refused, &["final.json", "0 final poses of 100"]);
     let refused = with(&|state| state["schema_version"] = 9.into());
     assert_refused(&refused, &["final.json", "schema version 9"]);
     evolver.write("final.json", &text.as_bytes()[..700]);
@@ -391,4 +393,44 @@ fn an_exported_trajectory_is_classified_as_its_run_is() {
     let of_text = json(&evolver.run(&["classify", "trajectory", "--json"]));
     assert_eq!(of_text["structures"], of_run["structures"]);
     assert_refused(&evolver.run(&flags), &["--out", "trajectory", "exists"]);
+}
+
+#[test]
+fn evaluate_takes_a_runs_conditions_unless_others_are_given() {
+    let evolver = with_a_run(&["--grid", "11x18", "--robots", "90", "--noise", "0.05"]);
+    for genome in ["run", "run/best.genome"] {
+        let table = json(&evolver.run(&["evaluate", genome, "--starts", "2", "--json"]));
+        let row = &table["conditions"][0];
+        assert_eq!(row["grid"], "11x18");
+        assert_eq!(row["robots"], 90);
+        assert_eq!(row["noise"], 0.05);
+        assert_eq!(row["steps"], 60);
+    }
+    let flags = [
+        "evaluate", "run", "--starts", "2", "--robots", "50", "--json",
+    ];
+    let table = json(&evolver.run(&flags));
+    assert_eq!(table["conditions"][0]["robots"], 50);
+}
+
+#[test]
+fn a_picture_from_the_terminal_is_classified_as_its_run_is() {
+    let evolver = with_a_run(&[]);
+    let shown = evolver.run(&["classify", "run"]);
+    let picture: Vec<&str> = shown.stdout.lines().take(15).collect();
+    evolver.write("picture.txt", picture.join("\n").as_bytes());
+    let of_picture = json(&evolver.run(&["classify", "picture.txt", "--json"]));
+    let of_run = json(&evolver.run(&["classify", "run", "--json"]));
+    assert_eq!(of_picture["names"], of_run["names"]);
+    assert_eq!(of_picture["lines"], of_run["lines"]);
+    evolver.write("other.txt", b"nothing of the kind\n");
+    assert_refused(
+        &evolver.run(&["classify", "other.txt"]),
+        &["other.txt", "neither"],
+    );
+    evolver.write("empty.txt", b"");
+    assert_refused(
+        &evolver.run(&["classify", "empty.txt"]),
+        &["empty.txt", "neither"],
+    );
 }

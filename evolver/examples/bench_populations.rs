@@ -24,6 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             given.flag(key, Some(value));
         }
         let mut experiment = Experiment::new(Settings::resolve(&given, || 1)?);
+        let never = std::sync::atomic::AtomicBool::new(false);
         let mut bytes = Vec::new();
         for generation in 0..=GENERATIONS[2] {
             if GENERATIONS.contains(&generation) {
@@ -37,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     bytes.extend_from_slice(codec::encode(genome, provenance, &mut buffer)?);
                 }
             }
-            experiment.advance(Engine::Fast, Path::best());
+            experiment.advance(Engine::Fast, Path::best(), &never);
         }
         std::fs::write(format!("{folder}/{name}.genomes"), &bytes)?;
         println!("{name}: {} bytes", bytes.len());

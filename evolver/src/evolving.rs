@@ -4,7 +4,7 @@ use crate::experiment::{Experiment, GenerationRecord};
 use crate::files::FileError;
 use crate::run_dir::RunDir;
 use minimal_surprise_sim::{Engine, Path};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::thread::{self, ScopedJoinHandle};
 
 /// Evaluates the generations that are left, saving each; false if it was asked to stop before the
@@ -22,11 +22,10 @@ pub fn until_finished(
     thread::scope(|scope| {
         let mut saving = None;
         while !experiment.is_finished() {
-            if stop.load(Ordering::Relaxed) {
+            let Some(record) = experiment.advance(engine, path, stop) else {
                 finish(saving)?;
                 return Ok(false);
-            }
-            let record = experiment.advance(engine, path);
+            };
             finish(saving)?;
             let checkpoint = run.checkpoint(experiment);
             saving = Some(scope.spawn(move || run.write(&checkpoint)));

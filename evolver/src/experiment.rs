@@ -10,6 +10,7 @@ use minimal_surprise_sim::structures::{Structures, classify};
 use minimal_surprise_sim::{Engine, Evaluator, Path, Pose, SeedTree, Trial, TrialSet, WorldError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What a generation came to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -122,7 +123,14 @@ impl Experiment {
 
     /// Evaluates a generation, in parallel, and moves on to the next. Results do not depend on the
     /// number of threads, the engine or its path.
-    pub fn advance(&mut self, engine: Engine, path: Path) -> GenerationRecord {
+    ///
+    /// Nothing comes back, and nothing has changed, if `stop` was set on the way.
+    pub fn advance(
+        &mut self,
+        engine: Engine,
+        path: Path,
+        stop: &AtomicBool,
+    ) -> Option<GenerationRecord> {
         let seeds = SeedTree::new(self.settings.seed);
         let generation = self.history.len() as u32;
         let scenario = &self.settings.scenario;
@@ -130,16 +138,19 @@ impl Experiment {
             .map(|repetition| scenario.trial(seeds, generation, repetition))
             .collect();
         let trials = TrialSet::new(*scenario, self.settings.topology.model(), trials);
-        let evaluations: Vec<Evaluation> = self
+        let evaluations: Option<Vec<Evaluation>> = self
             .population
             .ask()
             .par_iter()
             .with_max_len(1)
             .map_init(
                 || Evaluator::new(engine, path),
-                |evaluator, genome| evaluator.evaluate(genome, &trials),
+                |evaluator, genome| {
+                    (!stop.load(Ordering::Relaxed)).then(|| evaluator.evaluate(genome, &trials))
+                },
             )
             .collect();
+        let evaluations = evaluations?;
         let matches: Vec<u64> = evaluations.iter().map(|e| e.matches).collect();
         let best = best_slot(&matches);
         let worst_repetition = evaluations[best].worst_repetition;
@@ -170,7 +181,7 @@ impl Experiment {
                 .population
                 .tell(&matches, self.settings.mutation, seeds);
         }
-        record
+        Some(record)
     }
 
     /// Whether every generation has been evaluated.

@@ -96,6 +96,16 @@ pub enum StateError {
         /// What is wrong and what would be valid.
         problem: String,
     },
+    /// Robots have appeared or vanished.
+    #[error("{}: {found} final poses of {start} robots that started", path.display())]
+    Count {
+        /// The file.
+        path: PathBuf,
+        /// Starting poses.
+        start: usize,
+        /// Final poses.
+        found: usize,
+    },
     /// The robots do not fit the grid.
     #[error("{}: {error}", path.display())]
     Poses {
@@ -154,6 +164,13 @@ pub fn parse_final_state(path: &Path, bytes: &[u8]) -> Result<FinalState, StateE
         value: file.grid.clone(),
         problem,
     })?;
+    if file.start.len() != file.r#final.len() {
+        return Err(StateError::Count {
+            path: path.to_owned(),
+            start: file.start.len(),
+            found: file.r#final.len(),
+        });
+    }
     for poses in [&file.start, &file.r#final] {
         check_poses(grid, poses).map_err(|error| StateError::Poses {
             path: path.to_owned(),

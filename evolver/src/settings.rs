@@ -152,20 +152,12 @@ impl Given {
                 return Err(SettingError::UnknownKey { place });
             };
             let value = value.get_ref();
-            let scalar = value
-                .as_str()
-                .or_else(|| value.as_integer().map(|integer| integer.as_str()))
-                .or_else(|| value.as_float().map(|float| float.as_str()));
-            let Some(scalar) = scalar else {
-                return Err(SettingError::Invalid {
-                    place,
-                    value: format!("({})", value.type_str()),
-                    problem: "expected a number or a string".to_owned(),
-                });
-            };
-            self.values
-                .entry(key)
-                .or_insert_with(|| (scalar.replace('_', ""), place));
+            let scalar = scalar_text(value).map_err(|problem| SettingError::Invalid {
+                place: place.clone(),
+                value: format!("({})", value.type_str()),
+                problem: problem.to_owned(),
+            })?;
+            self.values.entry(key).or_insert((scalar, place));
         }
         Ok(())
     }
@@ -342,9 +334,9 @@ impl Settings {
     #[must_use]
     pub fn robot_steps_per_generation(&self) -> u64 {
         u64::from(self.population)
-            * u64::from(self.repetitions)
-            * u64::from(self.scenario.steps())
-            * u64::from(self.scenario.robots())
+            .saturating_mul(self.repetitions.into())
+            .saturating_mul(self.scenario.steps().into())
+            .saturating_mul(self.scenario.robots().into())
     }
 
     /// Bits scored in one repetition: a fitness is a number of matches over this.
@@ -369,6 +361,23 @@ pub fn out(given: &Given) -> Option<PathBuf> {
         .values
         .get("out")
         .map(|(value, _)| PathBuf::from(value))
+}
+
+/// A string as it stands; a number without its underscores.
+fn scalar_text(value: &toml::de::DeValue<'_>) -> Result<String, &'static str> {
+    if let Some(text) = value.as_str() {
+        Ok(text.to_owned())
+    } else if let Some(integer) = value.as_integer() {
+        if integer.radix() == 10 {
+            Ok(integer.as_str().replace('_', ""))
+        } else {
+            Err("expected a decimal number")
+        }
+    } else if let Some(float) = value.as_float() {
+        Ok(float.as_str().replace('_', ""))
+    } else {
+        Err("expected a number or a string")
+    }
 }
 
 const PROBABILITY: &str = "expected a probability from 0 to 1";

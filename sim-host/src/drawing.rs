@@ -54,20 +54,20 @@ pub fn draw_members(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool)
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DrawingError {
     /// Rows of different lengths.
-    #[error("row {row} has {found} cells, the first row {expected}")]
+    #[error("line {line} has {found} cells, the first row {expected}")]
     UnevenRows {
-        /// The row, the northernmost being 0.
-        row: usize,
+        /// The line of the text, from 1.
+        line: usize,
         /// Its cells.
         found: usize,
         /// Cells of the first row.
         expected: usize,
     },
     /// A character that is neither an arrow nor an empty cell.
-    #[error("{found:?} in row {row}; cells are ▶ ▲ ◀ ▼ or ·")]
+    #[error("line {line}: {found:?}; cells are ▶ ▲ ◀ ▼, hollow ▷ △ ◁ ▽, or ·")]
     UnknownCharacter {
-        /// The row, the northernmost being 0.
-        row: usize,
+        /// The line of the text, from 1.
+        line: usize,
         /// The character.
         found: char,
     },
@@ -77,41 +77,47 @@ pub enum DrawingError {
 }
 
 /// Reads a drawing back: the grid, and the poses row by row from the south, each from the west.
-/// White space around rows and empty lines are skipped.
+/// Filled and hollow arrows are robots alike; spaces and empty lines are skipped.
 ///
 /// # Errors
-/// [`DrawingError`] says which row is wrong.
+/// [`DrawingError`] says which line is wrong.
 pub fn parse(drawing: &str) -> Result<(Grid, Vec<Pose>), DrawingError> {
-    let rows: Vec<Vec<char>> = drawing
-        .lines()
-        .map(|line| line.trim().chars().collect::<Vec<_>>())
-        .filter(|row| !row.is_empty())
-        .collect();
-    let width = rows.first().map_or(0, Vec::len);
-    let grid = Grid::new(width as u32, rows.len() as u32)?;
+    let mut rows: Vec<(usize, Vec<Option<Heading>>)> = Vec::new();
+    for (line, text) in (1..).zip(drawing.lines()) {
+        let cells = text
+            .chars()
+            .filter(|cell| !cell.is_whitespace())
+            .map(|found| cell(found).ok_or(DrawingError::UnknownCharacter { line, found }))
+            .collect::<Result<Vec<_>, _>>()?;
+        if !cells.is_empty() {
+            rows.push((line, cells));
+        }
+    }
+    let expected = rows.first().map_or(0, |(_, cells)| cells.len());
+    let grid = Grid::new(expected as u32, rows.len() as u32)?;
     let mut poses = Vec::new();
-    for (y, (row, cells)) in rows.iter().enumerate().rev().enumerate() {
-        if cells.len() != width {
+    for (y, (line, cells)) in (0..).zip(rows.into_iter().rev()) {
+        if cells.len() != expected {
             return Err(DrawingError::UnevenRows {
-                row,
+                line,
                 found: cells.len(),
-                expected: width,
+                expected,
             });
         }
-        for (x, &cell) in cells.iter().enumerate() {
-            let heading = Heading::ALL.into_iter().find(|&h| arrow(h) == cell);
-            match heading {
-                Some(heading) => poses.push(Pose {
-                    x: x as u16,
-                    y: y as u16,
-                    heading,
-                }),
-                None if cell == EMPTY => {}
-                None => return Err(DrawingError::UnknownCharacter { row, found: cell }),
-            }
+        for (x, heading) in (0..).zip(cells) {
+            poses.extend(heading.map(|heading| Pose { x, y, heading }));
         }
     }
     Ok((grid, poses))
+}
+
+/// What a character draws: a robot or none; nothing if it is not a cell.
+fn cell(drawn: char) -> Option<Option<Heading>> {
+    let of = |heading: &Heading| arrow(*heading) == drawn || hollow_arrow(*heading) == drawn;
+    match Heading::ALL.into_iter().find(of) {
+        None if drawn != EMPTY => None,
+        heading => Some(heading),
+    }
 }
 
 #[cfg(test)]
@@ -137,14 +143,23 @@ mod tests {
     }
 
     #[test]
+    fn pictures_with_spaces_and_hollow_arrows_are_read_too() {
+        let (grid, poses) = parse("  ▶ · △\n\n  · ▼ ·\n  ◁ · ·\n").unwrap();
+        assert_eq!(draw(grid, &poses), "▶·▲\n·▼·\n◀··");
+    }
+
+    #[test]
     fn uneven_rows_unknown_characters_and_small_grids_are_refused() {
         assert!(matches!(
             parse("···\n··\n···"),
-            Err(DrawingError::UnevenRows { row: 1, .. })
+            Err(DrawingError::UnevenRows { line: 2, .. })
         ));
         assert!(matches!(
             parse("···\n·x·\n···"),
-            Err(DrawingError::UnknownCharacter { row: 1, found: 'x' })
+            Err(DrawingError::UnknownCharacter {
+                line: 2,
+                found: 'x'
+            })
         ));
         assert!(matches!(parse(""), Err(DrawingError::Grid(_))));
     }

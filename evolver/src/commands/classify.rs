@@ -48,6 +48,14 @@ fn read_state(path: &Path) -> Result<(Grid, Vec<Pose>), BadInput> {
             path.display()
         ))
     })?;
+    let text = text.trim_start_matches('\u{feff}');
+    if !text.chars().any(|c| "▶▲◀▼▷△◁▽·{".contains(c)) && !text.starts_with("Gen:")
+    {
+        return Err(BadInput::new(format!(
+            "{}: neither a final.json, nor an agent_trajectory, nor a drawing of ▶ ▲ ◀ ▼ and ·",
+            path.display()
+        )));
+    }
     if text.starts_with("Gen:") {
         let trajectory = Trajectory::read(text)
             .map_err(|error| BadInput::new(format!("{}, {error}", path.display())))?;

@@ -4,16 +4,17 @@ use super::{BadInput, thread_pool};
 use crate::files;
 use crate::reevaluation::rerun;
 use crate::report::reevaluation::{Condition, conditions_json, conditions_text};
-use crate::settings::{count, parse_grid, probability};
+use crate::settings::{Given, Settings, count, parse_grid, probability};
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::{NoiseRate, Scenario, SeedTree};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Conditions as flags; lists give a table of all combinations.
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
-    /// The genome file.
+    /// The genome file, or a run directory; beside a run's config.toml, its conditions are the
+    /// defaults.
     genome: PathBuf,
     /// New starts under each of the conditions.
     #[arg(
@@ -23,38 +24,18 @@ pub struct EvaluateArgs {
         allow_hyphen_values = true
     )]
     starts: String,
-    /// Grids, as in 15x15,20x20.
-    #[arg(
-        long,
-        value_name = "WxH,…",
-        default_value = "15x15",
-        allow_hyphen_values = true
-    )]
-    grid: String,
-    /// Noise levels, as in 0,0.05.
-    #[arg(
-        long,
-        value_name = "P,…",
-        default_value = "0",
-        allow_hyphen_values = true
-    )]
-    noise: String,
-    /// Swarm sizes, as in 50,100.
-    #[arg(
-        long,
-        value_name = "N,…",
-        default_value = "100",
-        allow_hyphen_values = true
-    )]
-    robots: String,
-    /// Steps of a run.
-    #[arg(
-        long,
-        value_name = "N",
-        default_value = "500",
-        allow_hyphen_values = true
-    )]
-    steps: String,
+    /// Grids, as in 15x15,20x20 [default: the run's, else 15x15].
+    #[arg(long, value_name = "WxH,…", allow_hyphen_values = true)]
+    grid: Option<String>,
+    /// Noise levels, as in 0,0.05 [default: the run's, else 0].
+    #[arg(long, value_name = "P,…", allow_hyphen_values = true)]
+    noise: Option<String>,
+    /// Swarm sizes, as in 50,100 [default: the run's, else 100].
+    #[arg(long, value_name = "N,…", allow_hyphen_values = true)]
+    robots: Option<String>,
+    /// Steps of a run [default: the run's, else 500].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    steps: Option<String>,
     /// Root of all random numbers [default: the seed that the genome evolved with, else 0].
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     seed: Option<String>,
@@ -71,15 +52,36 @@ pub struct EvaluateArgs {
 /// # Errors
 /// [`BadInput`] names the flag, the value and what would be valid.
 pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
-    let path = arguments.genome.display();
-    let bytes = files::read(&arguments.genome).map_err(BadInput::new)?;
+    let file = if arguments.genome.is_dir() {
+        arguments.genome.join("best.genome")
+    } else {
+        arguments.genome.clone()
+    };
+    let path = file.display();
+    let bytes = files::read(&file).map_err(BadInput::new)?;
+    let run = conditions_beside(&file)?;
+    let or_of_run = |given: &Option<String>, of_run: fn(&Settings) -> String, default: &str| {
+        let of_run = || run.as_ref().map(of_run);
+        given
+            .clone()
+            .or_else(of_run)
+            .unwrap_or_else(|| default.to_owned())
+    };
+    let grid = or_of_run(&arguments.grid, |run| run.written.grid.clone(), "15x15");
+    let noise = or_of_run(&arguments.noise, |run| run.written.noise.to_string(), "0");
+    let robots = or_of_run(
+        &arguments.robots,
+        |run| run.written.robots.to_string(),
+        "100",
+    );
+    let steps = or_of_run(&arguments.steps, |run| run.written.steps.to_string(), "500");
     let encoded =
         EncodedGenome::decode(&bytes).map_err(|error| BadInput::new(format!("{path}: {error}")))?;
     let starts = flag("starts", &arguments.starts, |text| count(text, 1_000_000))?;
-    let steps = flag("steps", &arguments.steps, |text| count(text, u32::MAX))?;
-    let grids = list("grid", &arguments.grid, parse_grid)?;
-    let noises = list("noise", &arguments.noise, probability)?;
-    let swarms = list("robots", &arguments.robots, |text| count(text, u32::MAX))?;
+    let steps = flag("steps", &steps, |text| count(text, u32::MAX))?;
+    let grids = list("grid", &grid, parse_grid)?;
+    let noises = list("noise", &noise, probability)?;
+    let swarms = list("robots", &robots, |text| count(text, u32::MAX))?;
     let threads = match &arguments.threads {
         Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
         None => None,
@@ -123,6 +125,20 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
         );
     }
     Ok(())
+}
+
+/// The settings of the run that the genome came out of, if it lies in a run directory.
+fn conditions_beside(genome: &Path) -> Result<Option<Settings>, BadInput> {
+    let config = genome.with_file_name("config.toml");
+    if !config.is_file() {
+        return Ok(None);
+    }
+    let mut given = Given::default();
+    given.file(&config).map_err(BadInput::new)?;
+    given.forget("from");
+    Settings::resolve(&given, || 0)
+        .map(Some)
+        .map_err(BadInput::new)
 }
 
 /// A flag's value, or an error that names the flag.

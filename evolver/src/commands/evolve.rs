@@ -150,21 +150,30 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
         Some(directory) => match RunDir::open(directory)? {
             Found::Unfinished(experiment, run) => (*experiment, run),
             Found::Finished(hash) => {
-                show_line!("{} is complete; its hash is {hash}", directory.display());
+                if arguments.progress == ProgressMode::Json {
+                    let done = serde_json::json!({"event": "done", "hash": hash, "run": directory});
+                    show_line!("{done}");
+                } else {
+                    show_line!("{} is complete; its hash is {hash}", directory.display());
+                }
                 return Ok(ExitCode::SUCCESS);
             }
         },
         None => {
             let settings = Settings::resolve(&given, rand::random).map_err(BadInput::new)?;
-            if given.place("seed").is_none() && arguments.progress != ProgressMode::Json {
-                show_line!("seed {} (drawn)", settings.seed);
-            }
+            let seed = settings.seed;
             let experiment = Experiment::new(settings);
             let run = match settings::out(&given) {
                 Some(path) => RunDir::create(&path, &experiment),
                 None => RunDir::create_named(Path::new("runs"), &experiment),
             }
-            .map_err(|error| BadInput::new(format!("--out: {error}")))?;
+            .map_err(|error| match given.place("out") {
+                Some(place) => BadInput::new(format!("{place}: {error}")),
+                None => BadInput::new(error),
+            })?;
+            if given.place("seed").is_none() && arguments.progress != ProgressMode::Json {
+                show_line!("seed {seed} (drawn)");
+            }
             (experiment, run)
         }
     };
@@ -188,7 +197,7 @@ fn generations(
     if !finished {
         progress.end();
         let program = summary::program();
-        let directory = run.path().display();
+        let directory = summary::shell_word(run.path());
         eprintln!("interrupted; go on with: {program} evolve --resume {directory}");
         return Ok(ExitCode::from(EXIT_INTERRUPTED));
     }
@@ -221,7 +230,7 @@ pub(super) fn stop_on_ctrl_c() -> Result<Arc<AtomicBool>, ctrlc::Error> {
         if asked.swap(true, Ordering::Relaxed) {
             std::process::exit(EXIT_INTERRUPTED.into());
         }
-        eprintln!("\nending after this generation; Ctrl-C again ends at once");
+        eprintln!("\nending; Ctrl-C again ends at once");
     })?;
     Ok(stop)
 }

@@ -83,7 +83,15 @@ pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
                 .map(|genome| (generation as u32, genome))
         })
         .collect::<Result<Vec<_>, _>>()
-        .map_err(BadInput::new)?;
+        .map_err(|error| {
+            let files = [Some(&arguments.action), arguments.prediction.as_ref()];
+            let files: Vec<String> = files
+                .into_iter()
+                .flatten()
+                .map(|file| file.display().to_string())
+                .collect();
+            BadInput::new(format!("{}: {error}", files.join(", ")))
+        })?;
     match fs::create_dir(&arguments.out) {
         Err(error) => {
             let out = arguments.out.display();

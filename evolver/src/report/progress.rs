@@ -81,7 +81,7 @@ impl Progress {
             Shown::Bar(bar) => {
                 bar.set_position(done.into());
                 bar.set_message(format!(
-                    "best {best:.3}  mean {mean:.3}  {millions:.1} M robot-steps/s  {} left",
+                    "best {best:.3}  mean {mean:.3}  {millions:.0} M robot-steps/s  {} left",
                     seconds(left)
                 ));
             }
@@ -116,7 +116,7 @@ impl Progress {
 }
 
 fn bar(generations: u32, done: u32) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len}  {msg}")
+    let style = ProgressStyle::with_template("{bar:16} {pos}/{len}  {wide_msg}")
         .expect("the template is well-formed");
     let bar = ProgressBar::new(generations.into()).with_style(style);
     bar.set_position(done.into());

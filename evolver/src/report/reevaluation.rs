@@ -38,10 +38,10 @@ fn fitnesses(reruns: &[Rerun]) -> Vec<f64> {
 
 /// Which way lines run in most of the runs; none where no run has lines.
 fn orientation(reruns: &[Rerun]) -> String {
-    let runs: Vec<Option<LineOrientation>> = reruns.iter().map(|r| r.orientation).collect();
-    if runs.iter().all(Option::is_none) {
+    if !reruns.iter().any(|r| r.names.contains(&Structure::Line)) {
         return String::new();
     }
+    let runs: Vec<Option<LineOrientation>> = reruns.iter().map(|r| r.orientation).collect();
     LineOrientation::of_most(&runs).map_or("diverse".to_owned(), |most| most.name().to_owned())
 }
 
@@ -59,10 +59,15 @@ pub fn conditions_text(conditions: &[Condition]) -> String {
     ]);
     for condition in conditions {
         let values = fitnesses(&condition.reruns);
-        let structures: Vec<String> = name_counts(&condition.reruns)
+        let mut structures: Vec<String> = name_counts(&condition.reruns)
             .into_iter()
             .map(|(structure, count)| format!("{} {}", plain(count), structure.name()))
             .collect();
+        let nothing = condition.reruns.iter().filter(|r| r.names.is_empty());
+        match nothing.count() {
+            0 => {}
+            n => structures.push(format!("{n} nothing")),
+        }
         table.add_row([
             condition.scenario.grid().to_string(),
             condition.scenario.robots().to_string(),

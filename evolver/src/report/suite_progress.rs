@@ -47,7 +47,7 @@ impl SuiteProgress {
         }
         let terminal = std::io::stderr().is_terminal();
         let bar = || {
-            let style = ProgressStyle::with_template("{bar:30} {pos}/{len} runs  {msg}")
+            let style = ProgressStyle::with_template("{bar:16} {pos}/{len} runs  {wide_msg}")
                 .expect("the template is well-formed");
             let bar = ProgressBar::new(runs.len() as u64).with_style(style);
             bar.set_position((runs.len() - waiting) as u64);

@@ -25,12 +25,24 @@ pub fn program() -> &'static str {
     }
 }
 
+/// A path as a word that can be copied into a shell.
+#[must_use]
+pub fn shell_word(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let plain = |c: char| c.is_alphanumeric() || "/._-+=".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        text.into_owned()
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
+}
+
 /// The swarm's picture, two columns a cell, members as filled arrows (coloured on a terminal), the
 /// others hollow; where it does not fit, a line that says so.
 #[must_use]
 pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> String {
     let (rows, columns) = Term::stdout().size_checked().unwrap_or(WITHOUT_TERMINAL);
-    if 2 * u32::from(grid.width()) > u32::from(columns) || grid.height() > 4 * rows {
+    if 2 * u32::from(grid.width()) + 1 > u32::from(columns) || grid.height() > 4 * rows {
         return format!("(a {grid} grid is too large for this terminal to be drawn)");
     }
     let member = Style::new().cyan().bold();
@@ -59,7 +71,7 @@ pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> 
         measures: Some(&finding.measures),
     };
     let program = program();
-    let directory = directory.display();
+    let directory = shell_word(directory);
     format!(
         "{picture}\n\n\
          structure     {structure}: {share:.0} % of the robots (filled arrows)\n\
@@ -69,7 +81,7 @@ pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> 
          run           {directory}\n\n\
          next:\n  \
          measure the run        {program} classify {directory}\n  \
-         from other starts      {program} evaluate {directory}/best.genome\n  \
+         from other starts      {program} evaluate {directory}\n  \
          look into the genome   {program} inspect {directory}/best.genome\n  \
          evolve it further      {program} evolve --from {directory}/best.genome\n  \
          the same run again     {program} evolve {directory}/config.toml\n",
