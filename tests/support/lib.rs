@@ -6,5 +6,6 @@ pub mod full;
 pub mod golden;
 pub mod link_robot;
 pub mod program;
+pub mod robot;
 pub mod structures;
 pub mod tools;
