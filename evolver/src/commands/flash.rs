@@ -26,13 +26,16 @@ pub fn flash(arguments: &FlashArgs) -> anyhow::Result<()> {
     let mut robot = Robot::connect(&port, baud).map_err(BadInput::new)?;
     eprintln!("{port}: {}", robot.identity());
     robot.check_kernel().map_err(BadInput::new)?;
+    let was_running = robot.identity().running;
     robot.stop().map_err(BadInput::new)?;
     let bar = bar(container.len());
     let result = robot.write(&container, |bytes| bar.set_position(bytes as u64));
     bar.finish_and_clear();
     if let Err(error) = result {
-        // It stands, with a genome to run; if it does not answer, there is nothing more to do.
-        let _ = robot.start();
+        if was_running && error.is_refusal() {
+            // It has a genome to run, the old one; the error is what the user has to know.
+            let _ = robot.start();
+        }
         return Err(BadInput::new(error).into());
     }
     robot.start().map_err(BadInput::new)?;

@@ -4,7 +4,7 @@ use super::{BadInput, PortArgs, read_genome};
 use crate::finished_run::FinishedRun;
 use crate::hil::{Course, HilError, Ran};
 use crate::report::summary::program;
-use crate::robot::{Robot, describe, is_in_use};
+use crate::robot::{Robot, RobotError, describe, is_in_use};
 use crate::settings::{Given, Settings, model_name};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -84,14 +84,12 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<ExitCode> {
     }
     let was_running = robot.identity().running;
     robot.stop().map_err(BadInput::new)?;
-    let ran = run(&course, &mut robot);
-    // The robot is left as it was found, whatever came of the run; one that does not answer any
-    // more cannot be.
-    let left = robot
-        .reset()
-        .and_then(|()| if was_running { robot.start() } else { Ok(()) });
-    let ran = ran?;
-    left.map_err(BadInput::new)?;
+    let ran = run(&course, &mut robot).map_err(BadInput::new)?;
+    // The robot is left as it was found.
+    robot.reset().map_err(BadInput::new)?;
+    if was_running {
+        robot.start().map_err(BadInput::new)?;
+    }
     println!("hash        {}", ran.hash);
     if ran == simulated {
         println!("simulation  {}, equal", simulated.hash);
@@ -149,8 +147,8 @@ fn of_genome(arguments: &HilArgs) -> Result<(Course, PathBuf), BadInput> {
 }
 
 /// The run with the robot, from a fresh start of it.
-fn run(course: &Course, robot: &mut Robot) -> Result<Ran, BadInput> {
-    robot.reset().map_err(BadInput::new)?;
+fn run(course: &Course, robot: &mut Robot) -> Result<Ran, HilError<RobotError>> {
+    robot.reset().map_err(HilError::Robot)?;
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} steps  {per_sec}")
         .expect("the template is well-formed");
     let bar = ProgressBar::new(course.scenario.steps().into()).with_style(style);
@@ -159,10 +157,7 @@ fn run(course: &Course, robot: &mut Robot) -> Result<Ran, BadInput> {
         robot.step(reading)
     });
     bar.finish_and_clear();
-    ran.map_err(|error| match error {
-        HilError::World(error) => BadInput::new(error),
-        HilError::Robot(error) => BadInput::new(error),
-    })
+    ran
 }
 
 /// Where robot and simulation parted.

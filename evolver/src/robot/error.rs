@@ -14,6 +14,14 @@ pub struct RobotError {
     pub problem: Problem,
 }
 
+impl RobotError {
+    /// Whether the robot is there and has only said no.
+    #[must_use]
+    pub fn is_refusal(&self) -> bool {
+        matches!(self.problem, Problem::Refused { .. })
+    }
+}
+
 /// What is wrong.
 #[derive(Debug, thiserror::Error)]
 pub enum Problem {

@@ -29,7 +29,7 @@ pub(super) struct Line {
     client: Client,
     /// Bytes that have come in this conversation.
     received: u64,
-    /// Whether an answer has come in it.
+    /// Whether an answer has ever come.
     answered: bool,
 }
 
@@ -67,7 +67,6 @@ impl Line {
     pub(super) fn start_over(&mut self) {
         self.client = new_client();
         self.received = 0;
-        self.answered = false;
     }
 
     /// Asks, as often as it takes, until the answer is there; `take` gets out of it what is wanted.

@@ -167,15 +167,14 @@ impl Robot {
             });
         match committed {
             // The answer may be what got lost: the robot knows.
-            Err(RobotError {
-                problem: Problem::Unanswered { .. },
-                ..
-            }) => self.identify()?,
-            other => {
-                other?;
-                self.identify()?
+            Err(error) if matches!(error.problem, Problem::Unanswered { .. }) => {
+                self.identify().map_err(|_| error)?;
             }
-        };
+            committed => {
+                committed?;
+                self.identify()?;
+            }
+        }
         if is_in_use(self.identity.genome, container) {
             Ok(())
         } else {
