@@ -73,9 +73,7 @@ pub fn intel_hex(container: &[u8], address: u32) -> Option<String> {
         };
     }
     records.push(Record::EndOfFile);
-    let mut text = create_object_file_representation(&records).ok()?;
-    text.push('\n');
-    Some(text)
+    create_object_file_representation(&records).ok()
 }
 
 /// The command that writes the raw container to a chip through a debug probe.
