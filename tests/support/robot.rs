@@ -152,35 +152,24 @@ impl Line {
         }
     }
 
-    /// Writes a genome to a robot that stands, in an open session. Calls `before` with the number
-    /// of each request before it is sent. Says the write count.
+    /// Writes a genome to a robot that stands, in an open session. Says the write count.
     ///
     /// # Errors
     /// [`LineError`].
     ///
     /// # Panics
     /// If the robot refuses.
-    pub fn write(
-        &mut self,
-        container: &[u8],
-        chunk_bytes: usize,
-        mut before: impl FnMut(usize),
-    ) -> Result<u32, LineError> {
+    pub fn write(&mut self, container: &[u8], chunk_bytes: usize) -> Result<u32, LineError> {
         let done = |reply: Reply<'_>| assert_eq!(reply, Reply::Done);
         let begin = Request::Begin {
             length: container.len().try_into().expect("a container's length"),
             crc: crc_of(container).expect("a container's CRC"),
         };
-        before(0);
         self.ask(&begin, done)?;
-        let mut requests = 1;
         for (index, data) in container.chunks(chunk_bytes).enumerate() {
             let offset = (index * chunk_bytes) as u16;
-            before(requests);
             self.ask(&Request::Chunk { offset, data }, done)?;
-            requests += 1;
         }
-        before(requests);
         self.ask(&Request::Commit, |reply| match reply {
             Reply::Committed { write_count } => write_count,
             other => panic!("{other:?}"),
