@@ -434,3 +434,138 @@ fn a_picture_from_the_terminal_is_classified_as_its_run_is() {
         &["empty.txt", "neither"],
     );
 }
+
+/// A program that prints the bytes of an exported genome, compiled and run.
+fn printed_by(evolver: &Evolver, compiler: &str, arguments: &[&str]) -> Vec<u8> {
+    let run = |program: &Path, arguments: &[&str]| {
+        let mut command = std::process::Command::new(program);
+        let output = command
+            .args(arguments)
+            .current_dir(evolver.folder())
+            .output();
+        let output = output.unwrap_or_else(|error| panic!("{}: {error}", program.display()));
+        assert!(output.status.success(), "{output:?}");
+        output.stdout
+    };
+    run(Path::new(compiler), arguments);
+    run(&evolver.folder().join("printer"), &[])
+}
+
+#[test]
+fn an_exported_genome_has_the_same_bytes_in_c_and_rust() {
+    let evolver = with_a_run(&[]);
+    let container = evolver.read("run/best.genome");
+    for (format, name) in [("c", "genome.h"), ("rust", "genome.rs")] {
+        let arguments = [
+            "export",
+            "run/best.genome",
+            "--format",
+            format,
+            "--out",
+            name,
+        ];
+        let run = evolver.run(&arguments);
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let again = evolver.run(&arguments);
+        assert_refused(&again, &[&format!("--out = {name}"), "File exists"]);
+    }
+    evolver.write(
+        "printer.c",
+        b"#include <stdio.h>\n#include \"genome.h\"\n#include \"genome.h\"\nint main(void) {\n\
+          return fwrite(minimal_surprise_genome, sizeof minimal_surprise_genome, 1, stdout) != 1;\n}\n",
+    );
+    let flags = ["-std=c99", "-Wall", "-Werror", "-o", "printer", "printer.c"];
+    assert_eq!(printed_by(&evolver, "cc", &flags), container);
+    evolver.write(
+        "printer.rs",
+        b"#![deny(warnings, missing_docs)]\n//! Prints.\ninclude!(\"genome.rs\");\nfn main() {\n\
+          use std::io::Write;\n    std::io::stdout().write_all(&GENOME).unwrap();\n}\n",
+    );
+    let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned());
+    assert_eq!(printed_by(&evolver, &rustc, &["printer.rs"]), container);
+}
+
+#[test]
+fn an_exported_genome_goes_to_a_chip_raw_or_as_intel_hex() {
+    let evolver = with_a_run(&[]);
+    let container = evolver.read("run/best.genome");
+    let export = |more: &str| {
+        let arguments = ["export", "run/best.genome", "--format"];
+        let arguments = arguments.into_iter().chain(more.split(' '));
+        evolver.run(&arguments.collect::<Vec<_>>())
+    };
+    let raw = export("bin --out raw.bin --address 0x0800c000 --chip STM32F405RGTx");
+    assert_eq!(raw.code, Some(0), "{raw:?}");
+    assert_eq!(evolver.read("raw.bin"), container);
+    assert_eq!(
+        raw.stderr,
+        "probe-rs download --chip STM32F405RGTx --binary-format bin --base-address 0x0800c000 \
+         raw.bin\n"
+    );
+    // Without a file, the genome file is the raw form itself.
+    let raw = export("bin");
+    assert!(raw.stderr.ends_with(" run/best.genome\n"), "{raw:?}");
+
+    let hex = export("hex --address 0x0800fff0");
+    assert_eq!(hex.code, Some(0), "{hex:?}");
+    let mut upper = 0;
+    let mut next = 0x0800_fff0;
+    let mut bytes = Vec::<u8>::new();
+    for line in hex.stdout.lines() {
+        let digits = line.strip_prefix(':').unwrap().as_bytes().chunks(2);
+        let record: Vec<u8> = digits
+            .map(|pair| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap())
+            .collect();
+        let sum = record
+            .iter()
+            .fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
+        assert_eq!(
+            (usize::from(record[0]) + 5, sum),
+            (record.len(), 0),
+            "{line}"
+        );
+        let data = &record[4..record.len() - 1];
+        let address = u32::from(record[1]) << 8 | u32::from(record[2]);
+        match record[3] {
+            0 => {
+                assert_eq!(upper + address, next, "{line}");
+                next += data.len() as u32;
+                bytes.extend(data);
+            }
+            4 => upper = u32::from(data[0]) << 24 | u32::from(data[1]) << 16,
+            kind => assert_eq!((kind, data), (1, &[][..]), "{line}"),
+        }
+    }
+    assert_eq!(bytes, container);
+    assert!(hex.stdout.ends_with(":00000001FF\n"));
+}
+
+#[test]
+fn export_refuses_what_is_no_genome_and_where_it_does_not_fit() {
+    let evolver = with_a_run(&[]);
+    evolver.write("damaged.genome", &evolver.read("run/best.genome")[..500]);
+    let refused = |arguments: &str, words: &[&str]| {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        let before = evolver.files();
+        assert_refused(&evolver.run(&arguments), words);
+        assert_eq!(evolver.files(), before);
+    };
+    for format in ["bin", "c", "rust", "hex"] {
+        refused(
+            &format!("export damaged.genome --format {format} --out out"),
+            &["damaged.genome", "too short"],
+        );
+    }
+    refused(
+        "export run/best.genome --format hex --address 0xfffffff0 --out out",
+        &["--address = 0xfffffff0", "beyond 0xffffffff"],
+    );
+    refused(
+        "export run/best.genome --format bin --address flash --out out",
+        &["--address = flash", "as in 0x080e0000"],
+    );
+    refused(
+        "export run/best.genome --format trajectory",
+        &["holds no complete run"],
+    );
+}

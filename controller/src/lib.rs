@@ -25,11 +25,13 @@
 //! | `neighbours` | [`neighbours`]: detected neighbours (range and bearing) become sensor bits |
 //! | `defmt` | every public type can be logged with `defmt` |
 #![no_std]
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 pub mod activation;
 pub mod codec;
 pub mod controller;
+#[cfg(has_smlad)]
+mod dsp;
 pub mod fixed;
 pub mod genome;
 #[cfg(feature = "neighbours")]

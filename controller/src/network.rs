@@ -11,7 +11,9 @@
 //! it has one; output rows.
 
 use crate::activation::activate;
-use crate::fixed::{FRACTION_BITS, MAX_TERMS, ONE_Q3_12, ROUNDING_Q24, saturate, sum_to_q3_12};
+use crate::fixed::{FRACTION_BITS, MAX_TERMS, ONE_Q3_12, saturate};
+#[cfg(not(has_smlad))]
+use crate::fixed::{ROUNDING_Q24, sum_to_q3_12};
 
 /// Most inputs of a network: 14 sensors and the action value.
 pub const MAX_INPUTS: usize = 15;
@@ -157,9 +159,15 @@ pub struct Network<const H: usize, const O: usize> {
     /// Activation of each input neuron for a bit of 0 and of 1.
     input: [[i16; 2]; MAX_INPUTS],
     /// Inputs' weights from 0 on, the self-loop at [`SELF_LOOP`].
-    hidden: [[i16; MAX_TERMS]; H],
-    output: [[i16; H]; O],
+    hidden: Aligned<[[i16; MAX_TERMS]; H]>,
+    output: Aligned<[[i16; H]; O]>,
 }
+
+/// Starts at a word: several weights can be loaded at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(C, align(4))]
+pub(crate) struct Aligned<T>(pub(crate) T);
 
 /// The action network of any topology.
 pub type ActionNetwork = Network<8, 2>;
@@ -176,8 +184,8 @@ impl<const H: usize, const O: usize> Network<H, O> {
         let mut network = Self {
             shape,
             input: [[0; 2]; MAX_INPUTS],
-            hidden: [[0; MAX_TERMS]; H],
-            output: [[0; H]; O],
+            hidden: Aligned([[0; MAX_TERMS]; H]),
+            output: Aligned([[0; H]; O]),
         };
         for levels in network.input.iter_mut().take(shape.inputs()) {
             let weight = i32::from(weights.next().unwrap_or(0));
@@ -187,7 +195,7 @@ impl<const H: usize, const O: usize> Network<H, O> {
                 activate(saturate(weight - threshold)),
             ];
         }
-        for row in network.hidden.iter_mut().take(shape.hidden()) {
+        for row in network.hidden.0.iter_mut().take(shape.hidden()) {
             for weight in row.iter_mut().take(shape.inputs()) {
                 *weight = weights.next().unwrap_or(0);
             }
@@ -195,7 +203,7 @@ impl<const H: usize, const O: usize> Network<H, O> {
                 row[SELF_LOOP] = weights.next().unwrap_or(0);
             }
         }
-        for row in network.output.iter_mut().take(shape.outputs()) {
+        for row in network.output.0.iter_mut().take(shape.outputs()) {
             for weight in row.iter_mut().take(shape.hidden()) {
                 *weight = weights.next().unwrap_or(0);
             }
@@ -219,13 +227,13 @@ impl<const H: usize, const O: usize> Network<H, O> {
     /// shape.
     #[must_use]
     pub fn hidden_rows(&self) -> &[[i16; MAX_TERMS]; H] {
-        &self.hidden
+        &self.hidden.0
     }
 
     /// Output weights (Q3.12): a row an output; zero beyond the shape.
     #[must_use]
     pub fn output_rows(&self) -> &[[i16; H]; O] {
-        &self.output
+        &self.output.0
     }
 
     /// One forward pass: bit j of `inputs` is input j, bit k of the result is set where output k
@@ -233,20 +241,57 @@ impl<const H: usize, const O: usize> Network<H, O> {
     /// without self-loops only the latter.
     #[inline]
     pub(crate) fn forward(&self, inputs: u32, hidden: &mut [i16; H]) -> u16 {
-        let mut terms = [0; MAX_TERMS];
-        for (index, (term, levels)) in terms.iter_mut().zip(&self.input).enumerate() {
+        let mut terms = Aligned([0; MAX_TERMS]);
+        for (index, (term, levels)) in terms.0.iter_mut().zip(&self.input).enumerate() {
             *term = levels[(inputs >> index & 1) as usize];
         }
-        for (row, value) in self.hidden.iter().zip(hidden.iter_mut()) {
-            terms[SELF_LOOP] = *value;
-            *value = activate(sum_to_q3_12(ROUNDING_Q24 + dot(row, &terms)));
+        let mut values = Aligned(*hidden);
+        let neurons = self.shape.hidden();
+        hidden_sums(&self.hidden, &mut terms, &mut values.0, neurons);
+        for value in values.0.iter_mut().take(neurons) {
+            *value = activate(*value);
         }
-        let mut outputs = 0;
-        for (index, row) in self.output.iter().enumerate().take(self.shape.outputs()) {
-            outputs |= u16::from(dot(row, hidden) >= 0) << index;
-        }
-        outputs
+        *hidden = values.0;
+        output_signs(&self.output, &values, self.shape.outputs())
     }
+}
+
+/// Makes the first `count` values the Q3.12 sums of their rows' products with `terms`, of which
+/// each value is the last one.
+#[cfg(not(has_smlad))]
+#[inline]
+fn hidden_sums<const H: usize>(
+    rows: &Aligned<[[i16; MAX_TERMS]; H]>,
+    terms: &mut Aligned<[i16; MAX_TERMS]>,
+    values: &mut [i16; H],
+    count: usize,
+) {
+    for (row, value) in rows.0.iter().zip(values).take(count) {
+        terms.0[SELF_LOOP] = *value;
+        *value = sum_to_q3_12(ROUNDING_Q24 + dot(row, &terms.0));
+    }
+}
+
+#[cfg(has_smlad)]
+use crate::dsp::hidden_sums;
+
+/// Sets bit k where the sum of row k's products with `terms` is not negative, for the first `count`
+/// rows.
+#[inline]
+fn output_signs<const H: usize, const O: usize>(
+    rows: &Aligned<[[i16; H]; O]>,
+    terms: &Aligned<[i16; H]>,
+    count: usize,
+) -> u16 {
+    #[cfg(has_smlad)]
+    if H == crate::dsp::OUTPUT_TERMS {
+        return crate::dsp::output_signs(rows, terms, count);
+    }
+    let mut outputs = 0;
+    for (index, row) in rows.0.iter().enumerate().take(count) {
+        outputs |= u16::from(dot(row, &terms.0) >= 0) << index;
+    }
+    outputs
 }
 
 /// Exact sum of products, Q24. Callers have at most [`MAX_TERMS`] terms, one factor of each within

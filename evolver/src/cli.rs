@@ -7,8 +7,11 @@ use crate::commands::damage::{DamageArgs, damage};
 use crate::commands::evaluate::{EvaluateArgs, evaluate};
 use crate::commands::evolve::{EvolveArgs, evolve};
 use crate::commands::export::{ExportArgs, export};
+use crate::commands::flash::{FlashArgs, flash};
+use crate::commands::hil::{HilArgs, hil};
 use crate::commands::import::{ImportArgs, import};
 use crate::commands::inspect::inspect;
+use crate::commands::monitor::{MonitorArgs, monitor};
 use crate::commands::suite::{SuiteArgs, TaskArgs, Verb, paper, run_task, suite};
 use crate::run_dir::RunDirError;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -50,8 +53,14 @@ enum Command {
     Evaluate(EvaluateArgs),
     /// Take a part of what a swarm formed away, or scatter it, and see what the swarm does.
     Damage(DamageArgs),
-    /// Write a run in the format of another program.
+    /// Write a run or a genome in the format of another program.
     Export(ExportArgs),
+    /// Put a genome onto the robot on a serial port, and start it.
+    Flash(FlashArgs),
+    /// Show what the robot on a serial port does, and how surprised it is, until Ctrl-C.
+    Monitor(MonitorArgs),
+    /// Run a simulated swarm whose robot 0 is the robot on a serial port, and compare.
+    Hil(HilArgs),
     /// Make genome files of the genome text of the program that the paper's authors published.
     Import(ImportArgs),
     /// Show everything in a genome file.
@@ -87,6 +96,9 @@ pub fn main() -> ExitCode {
         Some(Command::Evaluate(arguments)) => evaluate(&arguments).map(done),
         Some(Command::Damage(arguments)) => damage(&arguments).map(done),
         Some(Command::Export(arguments)) => export(&arguments).map(done),
+        Some(Command::Flash(arguments)) => flash(&arguments).map(done),
+        Some(Command::Monitor(arguments)) => monitor(&arguments).map(done),
+        Some(Command::Hil(arguments)) => hil(&arguments),
         Some(Command::Import(arguments)) => import(&arguments).map(done),
         Some(Command::Inspect { genome }) => inspect(&genome).map(done),
         Some(Command::Paper { verb }) => paper(&verb),

@@ -2,7 +2,8 @@
 //! directories, and the command line `evolver`.
 //!
 //! Data flows one way: [`settings`] → [`evolution`] → [`experiment`] → [`checkpoint`] and
-//! [`run_dir`] → [`finished_run`] → [`reevaluation`] → [`report`] → [`commands`] → [`cli`].
+//! [`run_dir`] → [`finished_run`] → [`reevaluation`] and [`hil`] → [`report`] → [`commands`] →
+//! [`cli`]. Beside it: [`robot`], a robot on a serial line.
 #![forbid(unsafe_code)]
 
 #[macro_use]
@@ -16,8 +17,10 @@ pub mod evolving;
 pub mod experiment;
 pub mod files;
 pub mod finished_run;
+pub mod hil;
 pub mod reevaluation;
 pub mod report;
+pub mod robot;
 pub mod run_dir;
 pub mod run_hash;
 pub mod settings;

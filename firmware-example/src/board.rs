@@ -17,6 +17,11 @@ pub fn succeed() -> ! {
     end(EXIT_SUCCESS)
 }
 
+/// Ends the emulator: the program cannot go on. What is wrong has been logged.
+pub fn fail() -> ! {
+    end(EXIT_FAILURE)
+}
+
 fn end(status: ExitStatus) -> ! {
     loop {
         exit(status);

@@ -19,7 +19,7 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// The machine that `firmware-example/memory.x` describes, with a clock that advances by a fixed
 /// time an instruction.
-const QEMU: &str = "qemu-system-arm";
+pub(crate) const QEMU: &str = "qemu-system-arm";
 const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 \
     -icount shift=10,align=off,sleep=off \
     -nographic -monitor none -serial none \
@@ -70,6 +70,12 @@ pub fn build() -> Result<Firmware, Missing> {
 }
 
 impl Firmware {
+    /// The ELF file of a program.
+    #[must_use]
+    pub fn elf(&self, program: &str) -> PathBuf {
+        self.programs.join(program)
+    }
+
     /// Runs a program to its end and returns the lines it logged.
     ///
     /// # Errors
@@ -79,7 +85,7 @@ impl Firmware {
     /// If the program fails, or does not end.
     pub fn run(&self, program: &str) -> Result<Vec<String>, Missing> {
         let mut lines = Vec::new();
-        let status = run(&self.programs.join(program), |line| lines.push(line))?;
+        let status = run(&self.elf(program), |line| lines.push(line))?;
         let text = lines.join("\n");
         let status =
             status.unwrap_or_else(|error| panic!("{program}: {error}; it logged:\n{text}"));
@@ -110,11 +116,15 @@ pub fn run(elf: &Path, line: impl FnMut(String)) -> Result<io::Result<ExitStatus
             }
             Ok(result)
         }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Err(Missing(format!(
-            "no {QEMU} here; on Debian: apt-get install --no-install-recommends {QEMU}"
-        ))),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Err(no_qemu()),
         Err(error) => Ok(Err(error)),
     }
+}
+
+pub(crate) fn no_qemu() -> Missing {
+    Missing(format!(
+        "no {QEMU} here; on Debian: apt-get install --no-install-recommends {QEMU}"
+    ))
 }
 
 /// Decodes the log of the running program until it ends.

@@ -3,8 +3,12 @@
 pub mod firmware;
 pub mod flash;
 pub mod full;
+pub mod genome;
 pub mod golden;
 pub mod link_robot;
 pub mod program;
+#[cfg(target_os = "linux")]
+pub mod pty;
+pub mod robot;
 pub mod structures;
 pub mod tools;

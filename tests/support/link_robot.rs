@@ -2,7 +2,7 @@
 
 use crate::flash::MockFlash;
 use minimal_surprise_controller::{
-    Action, Controller, Decision, KERNEL_ID, SensorBits, State, Turn,
+    Action, Controller, Decision, KERNEL_ID, KernelId, SensorBits, State, Turn,
 };
 use minimal_surprise_link::{Faults, GenomeInUse, Handler, Identity, Refusal, Report, Stepped};
 use minimal_surprise_slots::{Buffer, Defect, Slots, UpdateError};
@@ -19,6 +19,10 @@ pub struct LinkRobot {
     controller: Controller,
     state: State,
     report: Report,
+    /// What it says that it computes with.
+    pub kernel: KernelId,
+    /// The step, counted from 0 since the last reset, in which its controller errs.
+    pub errs_in_step: Option<u32>,
     /// Requests carried out, identification and telemetry not counted.
     pub done: u64,
 }
@@ -40,6 +44,8 @@ impl LinkRobot {
             controller,
             state,
             report: Report::default(),
+            kernel: KERNEL_ID,
+            errs_in_step: None,
             done: 0,
         }
     }
@@ -48,6 +54,14 @@ impl LinkRobot {
     #[must_use]
     pub fn stop(self) -> Flash {
         self.slots.release()
+    }
+
+    /// One period of its control loop, if that runs.
+    pub fn period(&mut self, sensors: SensorBits) {
+        if self.report.running {
+            let decision = self.controller.step(&mut self.state, sensors);
+            self.count(decision);
+        }
     }
 
     fn faults(&self) -> Faults {
@@ -106,7 +120,7 @@ impl Handler for LinkRobot {
         Identity {
             firmware: "robot",
             version: "0.1.0",
-            kernel: KERNEL_ID,
+            kernel: self.kernel,
             genome,
             running: self.report.running,
             faults: self.faults(),
@@ -133,8 +147,12 @@ impl Handler for LinkRobot {
 
     fn step(&mut self, sensors: SensorBits) -> Result<Stepped, Refusal> {
         self.standing()?;
-        let decision = self.controller.step(&mut self.state, sensors);
+        let steps = self.report.straight + self.report.turned_left + self.report.turned_right;
+        let mut decision = self.controller.step(&mut self.state, sensors);
         self.count(decision);
+        if self.errs_in_step == Some(steps) {
+            decision.prediction = SensorBits::new(decision.prediction.bits() ^ 1);
+        }
         Ok(Stepped {
             decision,
             surprise: self.state.surprise(),

@@ -1,58 +1,123 @@
-//! `evolver export`: runs in the formats of other programs.
+//! `evolver export`: runs and genomes in the formats of other programs.
 
-use super::BadInput;
+use super::evaluate::flag;
+use super::{BadInput, read_genome};
 use crate::finished_run::FinishedRun;
+use crate::report::embedding::{c_header, intel_hex, probe_rs_line, rust_source};
 use clap::{Args, ValueEnum};
+use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::exchange::Trajectory;
 use std::fs::OpenOptions;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 
 /// What to export, and how.
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// The run directory.
-    run: PathBuf,
+    /// The genome file; for trajectories, the run directory.
+    #[arg(value_name = "GENOME|RUN")]
+    from: PathBuf,
     /// The format.
     #[arg(long, value_enum)]
     format: Format,
     /// The file to write; must not exist [default: standard output].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// For bin and hex: where in the chip's memory the genome will be.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "0x080e0000",
+        allow_hyphen_values = true
+    )]
+    address: String,
+    /// For bin: the chip, as probe-rs names it.
+    #[arg(long, value_name = "CHIP", default_value = "STM32F407VGTx")]
+    chip: String,
 }
 
 /// Formats of other programs.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
+    /// The genome as it is; says how to write it to a chip with probe-rs.
+    Bin,
+    /// The genome as a C header.
+    C,
+    /// The genome as Rust source.
+    Rust,
+    /// The genome as Intel HEX.
+    Hex,
     /// `agent_trajectory` of the authors' program: poses of every step.
     Trajectory,
 }
 
-/// Exports a run.
+/// Exports a genome or a run.
 ///
 /// # Errors
-/// [`BadInput`] if the run cannot be read or the file exists.
+/// [`BadInput`] if genome or run cannot be read or the file exists.
 pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
-    let finished = FinishedRun::read(&arguments.run).map_err(BadInput::new)?;
-    let text = match arguments.format {
-        Format::Trajectory => {
-            let trace = finished.trace()?;
-            let grid = finished.settings.scenario.grid();
-            let mut text = Vec::new();
-            Trajectory::of_trace(finished.provenance.generation, grid, &trace).write(&mut text)?;
-            text
-        }
+    let address = flag("address", &arguments.address, memory_address)?;
+    let bytes = match arguments.format {
+        Format::Trajectory => trajectory(arguments)?,
+        format => genome(arguments, format, address)?,
     };
     match &arguments.out {
-        None => show!("{}", String::from_utf8_lossy(&text)),
+        None if arguments.format == Format::Bin && std::io::stdout().is_terminal() => {
+            return Err(
+                BadInput::new("--out is missing; a terminal cannot show --format = bin").into(),
+            );
+        }
+        None => crate::output::write_bytes(&bytes),
         Some(path) => {
             let mut file = OpenOptions::new()
                 .write(true)
                 .create_new(true)
                 .open(path)
                 .map_err(|error| BadInput::new(format!("--out = {}: {error}", path.display())))?;
-            file.write_all(&text)?;
+            file.write_all(&bytes)?;
         }
     }
+    if arguments.format == Format::Bin {
+        let file = arguments.out.as_ref().unwrap_or(&arguments.from);
+        eprintln!("{}", probe_rs_line(file, &arguments.chip, address));
+    }
     Ok(())
+}
+
+fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
+    let finished = FinishedRun::read(&arguments.from).map_err(BadInput::new)?;
+    let trace = finished.trace()?;
+    let grid = finished.settings.scenario.grid();
+    let mut text = Vec::new();
+    Trajectory::of_trace(finished.provenance.generation, grid, &trace).write(&mut text)?;
+    Ok(text)
+}
+
+fn genome(arguments: &ExportArgs, format: Format, address: u32) -> anyhow::Result<Vec<u8>> {
+    let container = read_genome(&arguments.from)?;
+    let encoded = EncodedGenome::decode(&container)?;
+    Ok(match format {
+        Format::C => c_header(&encoded, &container).into_bytes(),
+        Format::Rust => rust_source(&encoded, &container).into_bytes(),
+        Format::Hex => {
+            let text = intel_hex(&container, address).ok_or_else(|| {
+                BadInput::new(format!(
+                    "--address = {}: the genome's {} bytes would go beyond 0xffffffff",
+                    arguments.address,
+                    container.len()
+                ))
+            })?;
+            text.into_bytes()
+        }
+        Format::Bin | Format::Trajectory => container,
+    })
+}
+
+/// An address, decimal or hexadecimal.
+fn memory_address(text: &str) -> Result<u32, String> {
+    let parsed = match text.strip_prefix("0x") {
+        Some(digits) => u32::from_str_radix(digits, 16),
+        None => text.parse(),
+    };
+    parsed.map_err(|_| "expected an address from 0 to 0xffffffff, as in 0x080e0000".to_owned())
 }

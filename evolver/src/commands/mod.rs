@@ -6,9 +6,19 @@ pub mod damage;
 pub mod evaluate;
 pub mod evolve;
 pub mod export;
+pub mod flash;
+pub mod hil;
 pub mod import;
 pub mod inspect;
+pub mod monitor;
 pub mod suite;
+
+use crate::files;
+use crate::robot::PortName;
+use crate::settings::count;
+use clap::Args;
+use minimal_surprise_controller::EncodedGenome;
+use std::path::Path;
 
 /// Input that cannot be used, in one message.
 #[derive(Debug, thiserror::Error)]
@@ -29,4 +39,36 @@ impl BadInput {
 pub fn thread_pool(threads: Option<u32>) -> Result<rayon::ThreadPool, rayon::ThreadPoolBuildError> {
     let threads = threads.unwrap_or(0) as usize;
     rayon::ThreadPoolBuilder::new().num_threads(threads).build()
+}
+
+/// Where a robot is.
+#[derive(Debug, Args)]
+pub struct PortArgs {
+    /// The serial port that the robot is on, as in /dev/ttyACM0 or COM3.
+    #[arg(long, value_name = "PORT")]
+    port: String,
+    /// Speed of the line, in bits a second.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "115200",
+        allow_hyphen_values = true
+    )]
+    baud: String,
+}
+
+impl PortArgs {
+    fn checked(&self) -> Result<(PortName, u32), BadInput> {
+        let baud = evaluate::flag("baud", &self.baud, |text| count(text, 12_000_000))?;
+        Ok((PortName(self.port.clone()), baud))
+    }
+}
+
+/// The bytes of a genome file, after a look whether they are a genome for this program.
+fn read_genome(path: &Path) -> Result<Vec<u8>, BadInput> {
+    let bytes = files::read(path).map_err(BadInput::new)?;
+    match EncodedGenome::decode(&bytes) {
+        Ok(_) => Ok(bytes),
+        Err(error) => Err(BadInput::new(format!("{}: {error}", path.display()))),
+    }
 }

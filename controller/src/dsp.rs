@@ -1,0 +1,135 @@
+//! The sums of both layers with SMLAD, two products in one instruction: for chips with Arm's DSP
+//! extension, as Cortex-M4 and M7.
+//!
+//! The one module of this crate with `unsafe` code. The compiler's function for this instruction
+//! is not stable, and left to itself the compiler neither finds the instruction nor keeps the terms
+//! in few enough loads: a control step would take more instructions than a robot has to spend
+//! (test `budget`). Sums are exact, so that their order changes nothing: the results are those of
+//! the portable code to the bit (test `parity`).
+#![allow(unsafe_code)]
+
+use crate::fixed::{FRACTION_BITS, MAX_TERMS, ROUNDING_Q24};
+use crate::network::Aligned;
+use core::arch::asm;
+
+/// Terms of the sums that [`output_signs`] makes.
+pub(crate) const OUTPUT_TERMS: usize = 14;
+
+/// The hidden layer before its activation: for each of the first `count` rows the Q3.12 sum of its
+/// products with `terms`, whose last one is replaced by the row's place in `values`. The sum takes
+/// that place.
+#[inline]
+pub(crate) fn hidden_sums<const N: usize>(
+    rows: &Aligned<[[i16; MAX_TERMS]; N]>,
+    terms: &mut Aligned<[i16; MAX_TERMS]>,
+    values: &mut [i16; N],
+    count: usize,
+) {
+    let count = count.min(N);
+    if count == 0 {
+        return;
+    }
+    // SAFETY: reads `count` rows of eight words, `count` times the eight words of `terms`, and reads
+    // and writes `count` values; no more than there are. All start at words, as
+    // `ldm` wants it. The flags and the registers used are declared.
+    unsafe {
+        asm!(
+            "2:",
+            "mov {sum}, #{rounding}",
+            "ldm {terms}!, {{r0, r1, r2, r3}}",
+            "ldm {row}!, {{r4, r5, r8}}",
+            "smlad {sum}, r0, r4, {sum}",
+            "smlad {sum}, r1, r5, {sum}",
+            "smlad {sum}, r2, r8, {sum}",
+            "ldm {row}!, {{r4, r5, r8}}",
+            "smlad {sum}, r3, r4, {sum}",
+            "ldm {terms}, {{r0, r1, r2, r3}}",
+            "smlad {sum}, r0, r5, {sum}",
+            "smlad {sum}, r1, r8, {sum}",
+            "ldrh r4, [{value}]",
+            "pkhbt r3, r3, r4, lsl #16",
+            "ldm {row}!, {{r4, r5}}",
+            "smlad {sum}, r2, r4, {sum}",
+            "smlad {sum}, r3, r5, {sum}",
+            "subs {terms}, #16",
+            "ssat {sum}, #16, {sum}, asr #{fraction}",
+            "strh {sum}, [{value}], #2",
+            "subs {count}, #1",
+            "bne 2b",
+            rounding = const ROUNDING_Q24,
+            fraction = const FRACTION_BITS,
+            sum = out(reg) _,
+            terms = inout(reg) terms.0.as_ptr() => _,
+            row = inout(reg) rows.0.as_ptr() => _,
+            value = inout(reg) values.as_mut_ptr() => _,
+            count = inout(reg) count => _,
+            out("r0") _,
+            out("r1") _,
+            out("r2") _,
+            out("r3") _,
+            out("r4") _,
+            out("r5") _,
+            out("r8") _,
+            options(nostack),
+        );
+    }
+}
+
+/// The signs of an output layer: bit k is set where the sum of row k's products with `terms` is not
+/// negative, for the first `count` rows.
+///
+/// # Panics
+/// Unless a row has [`OUTPUT_TERMS`] terms; known when this is compiled.
+#[inline]
+pub(crate) fn output_signs<const N: usize, const O: usize>(
+    rows: &Aligned<[[i16; N]; O]>,
+    terms: &Aligned<[i16; N]>,
+    count: usize,
+) -> u16 {
+    assert!(N == OUTPUT_TERMS);
+    let count = count.min(O).min(16);
+    if count == 0 {
+        return 0;
+    }
+    let negative: u32;
+    // SAFETY: reads `count` rows of seven words and `count` times the seven words of `terms`; no
+    // more than there are. All start at words, as `ldm` wants it. The flags and the registers used
+    // are declared.
+    unsafe {
+        asm!(
+            "2:",
+            "ldm {terms}!, {{r0, r1, r2, r3}}",
+            "ldm {row}!, {{r4, r5, r8}}",
+            "smuad {sum}, r0, r4",
+            "smlad {sum}, r1, r5, {sum}",
+            "smlad {sum}, r2, r8, {sum}",
+            "ldm {row}!, {{r4, r5, r8}}",
+            "smlad {sum}, r3, r4, {sum}",
+            "ldm {terms}, {{r0, r1, r2}}",
+            "smlad {sum}, r0, r5, {sum}",
+            "smlad {sum}, r1, r8, {sum}",
+            "ldr r4, [{row}], #4",
+            "smlad {sum}, r2, r4, {sum}",
+            "subs {terms}, #16",
+            // The sign goes through the carry to the lower end; the first row's ends up highest.
+            "lsls {sum}, {sum}, #1",
+            "adcs {negative}, {negative}, {negative}",
+            "subs {count}, #1",
+            "bne 2b",
+            sum = out(reg) _,
+            terms = inout(reg) terms.0.as_ptr() => _,
+            row = inout(reg) rows.0.as_ptr() => _,
+            negative = inout(reg) 0 => negative,
+            count = inout(reg) count => _,
+            out("r0") _,
+            out("r1") _,
+            out("r2") _,
+            out("r3") _,
+            out("r4") _,
+            out("r5") _,
+            out("r8") _,
+            options(nostack, pure, readonly),
+        );
+    }
+    ((!negative).reverse_bits() >> (32 - count as u32)) as u16
+}

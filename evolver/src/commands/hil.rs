@@ -1,0 +1,187 @@
+//! `evolver hil`: a simulated swarm with the robot on the line in it.
+
+use super::{BadInput, PortArgs, read_genome};
+use crate::finished_run::FinishedRun;
+use crate::hil::{Course, HilError, Ran};
+use crate::report::summary::program;
+use crate::robot::{Robot, RobotError, describe, is_in_use};
+use crate::settings::{Given, Settings, model_name};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use minimal_surprise_controller::{Controller, EncodedGenome, Prediction};
+use minimal_surprise_sim::SeedTree;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// What to run, and where the robot is.
+#[derive(Debug, Args)]
+pub struct HilArgs {
+    /// A run directory, which says everything about the run; or a genome file.
+    run: PathBuf,
+    #[command(flatten)]
+    port: Option<PortArgs>,
+    /// Only simulate, without a robot.
+    #[arg(long, required_unless_present = "port", conflicts_with = "PortArgs")]
+    simulate: bool,
+    /// For a genome: width and height of the torus, in cells [default: 15x15].
+    #[arg(long, value_name = "WxH", allow_hyphen_values = true)]
+    grid: Option<String>,
+    /// For a genome: swarm size [default: 100].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    robots: Option<String>,
+    /// For a genome: steps [default: 500].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    steps: Option<String>,
+    /// For a genome: probability that a sensor bit is flipped [default: 0].
+    #[arg(long, value_name = "P", allow_hyphen_values = true)]
+    noise: Option<String>,
+    /// For a genome: root of all random numbers [default: the seed that it evolved with, else 0].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    seed: Option<String>,
+}
+
+impl HilArgs {
+    fn flags(&self) -> [(&'static str, &Option<String>); 5] {
+        [
+            ("grid", &self.grid),
+            ("robots", &self.robots),
+            ("steps", &self.steps),
+            ("noise", &self.noise),
+            ("seed", &self.seed),
+        ]
+    }
+}
+
+/// Runs a swarm whose robot 0 is on the line, and compares with the simulation.
+///
+/// # Errors
+/// [`BadInput`] if the run cannot be read, there is no such robot, or it runs another genome.
+pub fn hil(arguments: &HilArgs) -> anyhow::Result<ExitCode> {
+    let (course, genome) = if arguments.run.is_dir() {
+        of_run(arguments)?
+    } else {
+        of_genome(arguments)?
+    };
+    let simulated = course.simulate().map_err(BadInput::new)?;
+    let Some(port) = &arguments.port else {
+        show_line!("hash        {}", simulated.hash);
+        return Ok(ExitCode::SUCCESS);
+    };
+    let (port, baud) = port.checked()?;
+    let mut robot = Robot::connect(&port, baud).map_err(BadInput::new)?;
+    eprintln!("{port}: {}", robot.identity());
+    robot.check_kernel().map_err(BadInput::new)?;
+    let container = read_genome(&genome)?;
+    if !is_in_use(robot.identity().genome, &container) {
+        return Err(BadInput::new(format!(
+            "--port = {port}: the robot runs {}, not {}; put that onto it with: {} flash {} --port {port}",
+            describe(robot.identity().genome),
+            genome.display(),
+            program(),
+            genome.display(),
+        ))
+        .into());
+    }
+    let was_running = robot.identity().running;
+    robot.stop().map_err(BadInput::new)?;
+    let ran = run(&course, &mut robot).map_err(BadInput::new)?;
+    // The robot is left as it was found.
+    robot.reset().map_err(BadInput::new)?;
+    if was_running {
+        robot.start().map_err(BadInput::new)?;
+    }
+    show_line!("hash        {}", ran.hash);
+    if ran == simulated {
+        show_line!("simulation  {}, equal", simulated.hash);
+        Ok(ExitCode::SUCCESS)
+    } else {
+        show_line!("simulation  {}, different", simulated.hash);
+        eprintln!("error: {}", difference(&ran, &simulated));
+        Ok(ExitCode::FAILURE)
+    }
+}
+
+/// The run that a directory holds, and the file of its genome.
+fn of_run(arguments: &HilArgs) -> Result<(Course, PathBuf), BadInput> {
+    let directory = &arguments.run;
+    if let Some((flag, _)) = arguments.flags().iter().find(|(_, given)| given.is_some()) {
+        return Err(BadInput::new(format!(
+            "--{flag} and a run directory exclude each other; {} says what to run",
+            directory.display()
+        )));
+    }
+    let finished = FinishedRun::read(directory).map_err(BadInput::new)?;
+    let course = Course {
+        controller: Controller::new(&finished.genome),
+        scenario: finished.settings.scenario,
+        trial: finished.trial(),
+    };
+    Ok((course, directory.join("best.genome")))
+}
+
+/// The run that the flags ask for: the first trial of their seed.
+fn of_genome(arguments: &HilArgs) -> Result<(Course, PathBuf), BadInput> {
+    let bytes = read_genome(&arguments.run)?;
+    let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
+    let topology = encoded.topology();
+    let mut given = Given::default();
+    for (key, value) in arguments.flags() {
+        given.flag(key, value.as_deref());
+    }
+    given.flag("sensor-model", Some(model_name(topology.model())));
+    match topology.prediction() {
+        Prediction::Free => {}
+        Prediction::PartlyPredefined(template) => {
+            given.flag("predefine-partly", Some(template.name()));
+        }
+        Prediction::Predefined(template) => given.flag("predefine", Some(template.name())),
+    }
+    let seed = encoded.provenance().seed.unwrap_or(0);
+    let settings = Settings::resolve(&given, || seed).map_err(BadInput::new)?;
+    let course = Course {
+        controller: Controller::from_encoded(&encoded),
+        scenario: settings.scenario,
+        trial: settings.scenario.trial(SeedTree::new(settings.seed), 0, 0),
+    };
+    Ok((course, Path::new(&arguments.run).to_owned()))
+}
+
+/// The run with the robot, from a fresh start of it.
+fn run(course: &Course, robot: &mut Robot) -> Result<Ran, HilError<RobotError>> {
+    robot.reset().map_err(HilError::Robot)?;
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} steps  {per_sec}")
+        .expect("the template is well-formed");
+    let bar = ProgressBar::new(course.scenario.steps().into()).with_style(style);
+    let ran = course.with_robot(|reading| {
+        bar.inc(1);
+        robot.step(reading)
+    });
+    bar.finish_and_clear();
+    ran
+}
+
+/// Where robot and simulation parted.
+fn difference(ran: &Ran, simulated: &Ran) -> String {
+    match ran.first_difference(simulated) {
+        Some(step) => {
+            let (robot, here) = (ran.decisions[step - 1], simulated.decisions[step - 1]);
+            format!(
+                "in step {step} the robot decided {:?} {:?}, predicting {:#06x}; the simulation \
+                 {:?} {:?}, predicting {:#06x}",
+                robot.action,
+                robot.turn,
+                robot.prediction.bits(),
+                here.action,
+                here.turn,
+                here.prediction.bits()
+            )
+        }
+        None => format!(
+            "the robot counts {} of {} bits mispredicted, the simulation {} of {}",
+            ran.surprise.mispredicted_bits,
+            ran.surprise.seen_bits,
+            simulated.surprise.mispredicted_bits,
+            simulated.surprise.seen_bits
+        ),
+    }
+}

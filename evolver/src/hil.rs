@@ -1,0 +1,183 @@
+//! A simulated swarm whose robot 0 may be elsewhere: a robot on a line, in the loop.
+//!
+//! Its hash is the SHA-256 of a fixed text; the number of robots in 64 bits; their starting poses;
+//! for every step, for every robot: its reading in 16 bits, action and turn in 8 bits each, its
+//! prediction in 16 bits, and its pose afterwards; and at the end robot 0's mispredicted and seen
+//! bits in 64 bits each. A pose is x and y in 16 bits each and the heading in 8. All little-endian.
+
+use minimal_surprise_controller::{Controller, Decision, SensorBits, State, Surprise};
+use minimal_surprise_link::Stepped;
+use minimal_surprise_sim::{Pose, Scenario, Trial, World, WorldError};
+use sha2::{Digest, Sha256};
+use std::fmt;
+
+/// What the hash starts with.
+const START: &[u8] = b"minimal surprise hil, version 1";
+
+/// All that a run depends on.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// What the swarm runs.
+    pub controller: Controller,
+    /// Grid, swarm size, steps, noise.
+    pub scenario: Scenario,
+    /// Where it starts from, and the noise that it meets.
+    pub trial: Trial,
+}
+
+/// What a run came to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Ran {
+    /// Its hash.
+    pub hash: HilHash,
+    /// What robot 0 decided, by step.
+    pub decisions: Vec<Decision>,
+    /// Robot 0's surprise.
+    pub surprise: Surprise,
+}
+
+/// The hash of everything that happened in a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HilHash([u8; 32]);
+
+impl fmt::Display for HilHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for byte in self.0 {
+            write!(f, "{byte:02x}")?;
+        }
+        Ok(())
+    }
+}
+
+/// A run with a robot elsewhere has ended too early.
+#[derive(Debug, thiserror::Error)]
+pub enum HilError<E> {
+    /// The swarm cannot stand like that.
+    #[error(transparent)]
+    World(WorldError),
+    /// The robot has not stepped.
+    #[error(transparent)]
+    Robot(E),
+}
+
+impl Course {
+    /// Runs it with all robots simulated.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the starting poses do not fit the grid.
+    pub fn simulate(&self) -> Result<Ran, WorldError> {
+        let mut world = self.world()?;
+        let mut noise = self.trial.noise.clone();
+        let mut record = Record::of(&world);
+        for _ in 0..self.scenario.steps() {
+            world.step(&self.controller, &mut noise);
+            record.step(&world);
+        }
+        let surprise = world.states().first().map(State::surprise);
+        Ok(record.end(surprise.unwrap_or_default()))
+    }
+
+    /// Runs it with robot 0 elsewhere: `step` gives it readings and brings its decision back.
+    ///
+    /// # Errors
+    /// [`HilError`].
+    pub fn with_robot<E>(
+        &self,
+        mut step: impl FnMut(SensorBits) -> Result<Stepped, E>,
+    ) -> Result<Ran, HilError<E>> {
+        let mut world = self.world().map_err(HilError::World)?;
+        let mut noise = self.trial.noise.clone();
+        let mut record = Record::of(&world);
+        let mut others = world.states()[1..].to_vec();
+        let mut surprise = Surprise::default();
+        for _ in 0..self.scenario.steps() {
+            let mut failed = None;
+            world.step_with(&mut noise, |readings| {
+                let own = step(readings[0]).map(|stepped| {
+                    surprise = stepped.surprise;
+                    stepped.decision
+                });
+                // The world wants a decision in any case; this step is then the last one.
+                let own = own.unwrap_or_else(|error| {
+                    failed = Some(error);
+                    Decision {
+                        action: Default::default(),
+                        turn: Default::default(),
+                        prediction: SensorBits::NONE,
+                    }
+                });
+                let others = others.iter_mut().zip(&readings[1..]);
+                let others = others.map(|(state, &reading)| self.controller.step(state, reading));
+                std::iter::once(own).chain(others).collect()
+            });
+            if let Some(error) = failed {
+                return Err(HilError::Robot(error));
+            }
+            record.step(&world);
+        }
+        Ok(record.end(surprise))
+    }
+
+    fn world(&self) -> Result<World, WorldError> {
+        World::new(self.scenario.grid(), &self.trial.starts, &self.controller)
+    }
+}
+
+impl Ran {
+    /// The first step, counted from 1, in which robot 0 decided otherwise here than there.
+    #[must_use]
+    pub fn first_difference(&self, there: &Self) -> Option<usize> {
+        let pairs = self.decisions.iter().zip(&there.decisions);
+        pairs
+            .zip(1..)
+            .find_map(|((here, there), step)| (here != there).then_some(step))
+    }
+}
+
+/// A run as it goes.
+struct Record {
+    hash: Sha256,
+    decisions: Vec<Decision>,
+}
+
+impl Record {
+    fn of(world: &World) -> Self {
+        let mut hash = Sha256::new_with_prefix(START);
+        hash.update((world.poses().len() as u64).to_le_bytes());
+        for &pose in world.poses() {
+            add_pose(&mut hash, pose);
+        }
+        Self {
+            hash,
+            decisions: Vec::new(),
+        }
+    }
+
+    fn step(&mut self, world: &World) {
+        let robots = world.readings().iter().zip(world.decisions());
+        for ((reading, decision), &pose) in robots.zip(world.poses()) {
+            self.hash.update(reading.bits().to_le_bytes());
+            self.hash
+                .update([decision.action as u8, decision.turn as u8]);
+            self.hash.update(decision.prediction.bits().to_le_bytes());
+            add_pose(&mut self.hash, pose);
+        }
+        self.decisions.extend(world.decisions().first());
+    }
+
+    fn end(mut self, surprise: Surprise) -> Ran {
+        self.hash.update(surprise.mispredicted_bits.to_le_bytes());
+        self.hash.update(surprise.seen_bits.to_le_bytes());
+        Ran {
+            hash: HilHash(self.hash.finalize().into()),
+            decisions: self.decisions,
+            surprise,
+        }
+    }
+}
+
+fn add_pose(hash: &mut Sha256, pose: Pose) {
+    hash.update(pose.x.to_le_bytes());
+    hash.update(pose.y.to_le_bytes());
+    hash.update([pose.heading as u8]);
+}

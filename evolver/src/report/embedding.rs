@@ -1,0 +1,126 @@
+//! Genomes for those who link them into a firmware or write them to a chip.
+
+use crate::settings::describe;
+use ihex::{Record, create_object_file_representation};
+use minimal_surprise_controller::EncodedGenome;
+use std::path::Path;
+
+/// Bytes a line, in source text and Intel HEX.
+const LINE_BYTES: usize = 16;
+
+/// A C header with the container.
+#[must_use]
+pub fn c_header(genome: &EncodedGenome<'_>, container: &[u8]) -> String {
+    format!(
+        "/* A minimal-surprise genome: {}. */\n\
+         #ifndef MINIMAL_SURPRISE_GENOME_H\n\
+         #define MINIMAL_SURPRISE_GENOME_H\n\n\
+         #include <stdint.h>\n\n\
+         static const uint8_t minimal_surprise_genome[{}] = {{\n{}}};\n\n\
+         #endif\n",
+        describe(genome.topology()),
+        container.len(),
+        hex_lines(container)
+    )
+}
+
+/// Rust source with the container.
+#[must_use]
+pub fn rust_source(genome: &EncodedGenome<'_>, container: &[u8]) -> String {
+    format!(
+        "/// A minimal-surprise genome: {}.\n\
+         pub static GENOME: [u8; {}] = [\n{}];\n",
+        describe(genome.topology()),
+        container.len(),
+        hex_lines(container)
+    )
+}
+
+fn hex_lines(container: &[u8]) -> String {
+    let line = |bytes: &[u8]| {
+        let numbers: Vec<String> = bytes.iter().map(|byte| format!("{byte:#04x}")).collect();
+        format!("    {},\n", numbers.join(", "))
+    };
+    container.chunks(LINE_BYTES).map(line).collect()
+}
+
+/// Intel HEX with the container from an address on; none if it would go beyond 32 bits.
+#[must_use]
+pub fn intel_hex(container: &[u8], address: u32) -> Option<String> {
+    let mut records = Vec::new();
+    let mut upper = None;
+    let mut at = address;
+    let mut rest = container;
+    while !rest.is_empty() {
+        // A record has 16 bits of address, and does not go across their end.
+        let until_carry = 0x1_0000 - (at as usize & 0xffff);
+        let (value, after) = rest.split_at(rest.len().min(LINE_BYTES).min(until_carry));
+        let high = (at >> 16) as u16;
+        if upper != Some(high) {
+            records.push(Record::ExtendedLinearAddress(high));
+            upper = Some(high);
+        }
+        records.push(Record::Data {
+            offset: at as u16,
+            value: value.to_vec(),
+        });
+        let next = u64::from(at) + value.len() as u64;
+        rest = after;
+        at = match u32::try_from(next) {
+            Ok(next) => next,
+            Err(_) if rest.is_empty() => 0,
+            Err(_) => return None,
+        };
+    }
+    records.push(Record::EndOfFile);
+    create_object_file_representation(&records).ok()
+}
+
+/// The command that writes the raw container to a chip through a debug probe.
+#[must_use]
+pub fn probe_rs_line(file: &Path, chip: &str, address: u32) -> String {
+    format!(
+        "probe-rs download --chip {} --binary-format bin --base-address {address:#010x} {}",
+        quoted(chip),
+        quoted(&file.to_string_lossy())
+    )
+}
+
+/// As a shell takes it for one word.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./+:,=@".contains(c);
+    // What starts with a dash would be an option.
+    let word = match word.strip_prefix('-') {
+        Some(_) => format!("./{word}"),
+        None => word.to_owned(),
+    };
+    if !word.is_empty() && word.chars().all(plain) {
+        word
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intel_hex_goes_across_a_carry_and_ends_at_the_last_address() {
+        let text = intel_hex(&[1, 2, 3], 0x0800_fffe).unwrap();
+        let expected = ":020000040800F2\n:02FFFE000102FE\n:020000040801F1\n:0100000003FC\n\
+            :00000001FF\n";
+        assert_eq!(text, expected);
+        assert!(intel_hex(&[0; 4], 0xffff_fffc).is_some());
+        assert_eq!(intel_hex(&[0; 5], 0xffff_fffc), None);
+    }
+
+    #[test]
+    fn the_probe_rs_line_quotes_what_a_shell_would_split() {
+        assert_eq!(
+            probe_rs_line(Path::new("my robot's.bin"), "STM32F407VGTx", 0x0800_c000),
+            "probe-rs download --chip STM32F407VGTx --binary-format bin \
+             --base-address 0x0800c000 'my robot'\\''s.bin'"
+        );
+    }
+}

@@ -1,0 +1,272 @@
+//! A robot on a serial line: who it is, writing its genome, steps, telemetry.
+//!
+//! Here are the port, the clock and the retries that [`minimal_surprise_link`] leaves to the host.
+
+mod error;
+mod line;
+
+pub use error::{Doing, Heard, Problem, RobotError};
+pub use line::PortName;
+
+use line::{Line, is_lost_session};
+use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits};
+use minimal_surprise_link::{
+    CHUNK_BYTES_MAX, Faults, GenomeInUse, LineCounters, Reply, Report, Request, Stepped,
+};
+use std::fmt;
+
+/// Who the robot is and what it runs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// Name and version of the firmware.
+    pub firmware: String,
+    /// The arithmetic that it computes with.
+    pub kernel: KernelId,
+    /// The genome in use.
+    pub genome: GenomeInUse,
+    /// Whether the control loop runs.
+    pub running: bool,
+    /// What is wrong.
+    pub faults: Faults,
+}
+
+impl fmt::Display for Identity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let state = if self.running { "running" } else { "standing" };
+        let genome = describe(self.genome);
+        write!(f, "{}, {state}, {genome}", self.firmware)?;
+        for fault in fault_names(self.faults) {
+            write!(f, ", {fault}")?;
+        }
+        Ok(())
+    }
+}
+
+/// A genome in use, in words.
+#[must_use]
+pub fn describe(genome: GenomeInUse) -> String {
+    match genome {
+        GenomeInUse::BuiltIn => "the built-in genome".to_owned(),
+        GenomeInUse::Slot {
+            slot,
+            write_count,
+            length,
+            crc,
+        } => format!("genome {write_count} in slot {slot} ({length} bytes, CRC {crc:08x})"),
+    }
+}
+
+/// What is wrong, in words.
+#[must_use]
+pub fn fault_names(faults: Faults) -> Vec<&'static str> {
+    let names = [
+        (Faults::NO_GENOME, "no genome"),
+        (Faults::SLOT_DAMAGED, "a slot is damaged"),
+        (Faults::FLASH, "flash error"),
+        (Faults::NEIGHBOURS_STALE, "neighbour data too old"),
+        (Faults::WATCHDOG, "restarted by the watchdog"),
+    ];
+    let set = names
+        .into_iter()
+        .filter(|&(fault, _)| faults.contains(fault));
+    set.map(|(_, name)| name).collect()
+}
+
+/// Length and CRC of a container, as a robot names the genome in use; none of bytes that cannot be
+/// one.
+#[must_use]
+pub fn length_and_crc(container: &[u8]) -> Option<(u16, u32)> {
+    let (_, crc) = container.split_last_chunk()?;
+    let length = u16::try_from(container.len()).ok()?;
+    Some((length, u32::from_le_bytes(*crc)))
+}
+
+/// Whether the genome in use is this container.
+#[must_use]
+pub fn is_in_use(genome: GenomeInUse, container: &[u8]) -> bool {
+    match genome {
+        GenomeInUse::BuiltIn => false,
+        GenomeInUse::Slot { length, crc, .. } => length_and_crc(container) == Some((length, crc)),
+    }
+}
+
+/// A robot that has said who it is.
+pub struct Robot {
+    line: Line,
+    identity: Identity,
+}
+
+impl Robot {
+    /// Opens the port and asks who is there.
+    ///
+    /// # Errors
+    /// [`RobotError`] if there is no such port, nobody answers, or somebody else does.
+    pub fn connect(port: &PortName, baud: u32) -> Result<Self, RobotError> {
+        let mut line = Line::open(port, baud)?;
+        let identity = identify(&mut line)?;
+        Ok(Self { line, identity })
+    }
+
+    /// What it said when it was asked last.
+    #[must_use]
+    pub fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// Asks again who is there, in a new conversation.
+    ///
+    /// # Errors
+    /// [`RobotError`].
+    pub fn identify(&mut self) -> Result<&Identity, RobotError> {
+        self.line.start_over();
+        self.identity = identify(&mut self.line)?;
+        Ok(&self.identity)
+    }
+
+    /// Refuses a robot that computes differently.
+    ///
+    /// # Errors
+    /// [`Problem::OtherKernel`].
+    pub fn check_kernel(&self) -> Result<(), RobotError> {
+        let robot = self.identity.kernel;
+        if robot == KERNEL_ID {
+            Ok(())
+        } else {
+            Err(self.line.about(Problem::OtherKernel { robot }))
+        }
+    }
+
+    /// Writes a genome into the slot that is not in use and has the robot run it, calling `written`
+    /// with the bytes that it has. The robot has to stand.
+    ///
+    /// # Errors
+    /// [`RobotError`]; the robot then has the genome that it had, except after
+    /// [`Doing::Committing`], when it is not known.
+    pub fn write(
+        &mut self,
+        container: &[u8],
+        mut written: impl FnMut(usize),
+    ) -> Result<(), RobotError> {
+        let Some((length, crc)) = length_and_crc(container) else {
+            let refusal = minimal_surprise_link::Refusal::ImpossibleLength;
+            let doing = Doing::Receiving;
+            return Err(self.line.about(Problem::Refused { doing, refusal }));
+        };
+        self.done(Doing::Receiving, &Request::Begin { length, crc })?;
+        let mut offset = 0;
+        for data in container.chunks(CHUNK_BYTES_MAX) {
+            self.done(Doing::Receiving, &Request::Chunk { offset, data })?;
+            offset += data.len() as u16;
+            written(offset.into());
+        }
+        let committed = self
+            .line
+            .ask(Doing::Committing, &Request::Commit, |reply| match reply {
+                Reply::Committed { write_count } => Some(write_count),
+                _ => None,
+            });
+        match committed {
+            // The answer may be what got lost: the robot knows.
+            Err(error) if matches!(error.problem, Problem::Unanswered { .. }) => {
+                self.identify().map_err(|_| error)?;
+            }
+            committed => {
+                committed?;
+                self.identify()?;
+            }
+        }
+        if is_in_use(self.identity.genome, container) {
+            Ok(())
+        } else {
+            let runs = describe(self.identity.genome);
+            Err(self.line.about(Problem::NotInUse { runs }))
+        }
+    }
+
+    /// Runs the control loop.
+    ///
+    /// # Errors
+    /// [`RobotError`].
+    pub fn start(&mut self) -> Result<(), RobotError> {
+        self.done(Doing::Switching, &Request::Start)
+    }
+
+    /// Stops motors and control loop.
+    ///
+    /// # Errors
+    /// [`RobotError`].
+    pub fn stop(&mut self) -> Result<(), RobotError> {
+        self.done(Doing::Switching, &Request::Stop)
+    }
+
+    /// Has it forget the past. The robot has to stand.
+    ///
+    /// # Errors
+    /// [`RobotError`].
+    pub fn reset(&mut self) -> Result<(), RobotError> {
+        self.done(Doing::Switching, &Request::Reset)
+    }
+
+    /// One control step with these readings. The robot has to stand.
+    ///
+    /// # Errors
+    /// [`RobotError`].
+    pub fn step(&mut self, sensors: SensorBits) -> Result<Stepped, RobotError> {
+        let request = Request::Step { sensors };
+        self.line
+            .ask(Doing::Stepping, &request, |reply| match reply {
+                Reply::Stepped(stepped) => Some(stepped),
+                _ => None,
+            })
+    }
+
+    /// How it is going; none if the robot was restarted since it was asked last.
+    ///
+    /// # Errors
+    /// [`RobotError`].
+    pub fn telemetry(&mut self) -> Result<Option<(Report, LineCounters)>, RobotError> {
+        let told = self
+            .line
+            .ask(Doing::Reporting, &Request::Telemetry, |reply| match reply {
+                Reply::Telemetry { report, line } => Some((report, line)),
+                _ => None,
+            });
+        match told {
+            Err(error) if is_lost_session(&error.problem) => {
+                self.identify()?;
+                Ok(None)
+            }
+            told => told.map(Some),
+        }
+    }
+
+    /// Asks for something of which nothing is to be said but that it is done.
+    fn done(&mut self, doing: Doing, request: &Request<'_>) -> Result<(), RobotError> {
+        self.line
+            .ask(doing, request, |reply| (reply == Reply::Done).then_some(()))
+    }
+}
+
+fn identify(line: &mut Line) -> Result<Identity, RobotError> {
+    line.ask(
+        Doing::Identifying,
+        &Request::Identify,
+        |reply| match reply {
+            Reply::Identity(identity) => Some(Identity {
+                firmware: printable(identity.firmware, identity.version),
+                kernel: identity.kernel,
+                genome: identity.genome,
+                running: identity.running,
+                faults: identity.faults,
+            }),
+            _ => None,
+        },
+    )
+}
+
+/// Name and version without what a terminal would take for commands.
+fn printable(firmware: &str, version: &str) -> String {
+    let mut text = format!("{firmware} {version}");
+    text.retain(|character| !character.is_control());
+    text
+}

@@ -1,0 +1,301 @@
+//! The board of QEMU's machine `mps2-an386`: serial line, clock, and flash in a file on the host.
+//!
+//! It has no wheels and detects one neighbour that is not there; the link's step request is what
+//! drives it.
+//!
+//! With `unsafe` code: device registers are addresses, and so are the arguments of semihosting.
+#![allow(unsafe_code)]
+
+use crate::robot::{Board, Motion, NEIGHBOURS_MAX};
+use core::ptr;
+use cortex_m::interrupt::InterruptNumber;
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{NVIC, SCB, SYST};
+use cortex_m::{asm, interrupt};
+use cortex_m_semihosting::{nr, syscall};
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read,
+    check_write,
+};
+use minimal_surprise_controller::neighbours::{Detection, Neighbours};
+use minimal_surprise_link::Report;
+
+/// The processor's clock.
+const CLOCK_HZ: u32 = 25_000_000;
+/// Control periods a second.
+pub const CONTROL_HZ: u32 = 10;
+
+/// The serial line, the first UART of Arm's CMSDK.
+mod uart {
+    /// A byte received; a byte to send.
+    pub(super) const DATA: *mut u32 = 0x4000_4000 as *mut u32;
+    /// Whether there is one, and whether there is room for one.
+    pub(super) const STATE: *mut u32 = 0x4000_4004 as *mut u32;
+    pub(super) const STATE_SENDING: u32 = 1;
+    pub(super) const STATE_RECEIVED: u32 = 1 << 1;
+    pub(super) const CONTROL: *mut u32 = 0x4000_4008 as *mut u32;
+    pub(super) const CONTROL_SEND: u32 = 1;
+    pub(super) const CONTROL_RECEIVE: u32 = 1 << 1;
+    pub(super) const CONTROL_RECEIVE_INTERRUPT: u32 = 1 << 3;
+    pub(super) const INTERRUPT: *mut u32 = 0x4000_400c as *mut u32;
+    pub(super) const INTERRUPT_RECEIVED: u32 = 1 << 1;
+    pub(super) const DIVIDER: *mut u32 = 0x4000_4010 as *mut u32;
+}
+
+/// Bits a second; QEMU only wants a speed.
+const BAUD: u32 = 115_200;
+
+/// The interrupt of a received byte.
+#[derive(Clone, Copy)]
+struct Received;
+
+// SAFETY: the machine's interrupt 0 is that of the first UART's receiver.
+unsafe impl InterruptNumber for Received {
+    fn number(self) -> u16 {
+        0
+    }
+}
+
+/// Serial line and clock.
+///
+/// No interrupt is ever taken: they only wake the processor, and the loop looks what there is.
+pub struct Mps2 {
+    systick: SYST,
+    periods: u32,
+}
+
+impl Mps2 {
+    /// Starts clock and line.
+    #[must_use]
+    pub fn new(mut systick: SYST) -> Self {
+        interrupt::disable();
+        systick.set_clock_source(SystClkSource::Core);
+        systick.set_reload(CLOCK_HZ / CONTROL_HZ - 1);
+        systick.clear_current();
+        systick.enable_interrupt();
+        systick.enable_counter();
+        // SAFETY: registers of a device that nothing else uses. The interrupt is masked.
+        unsafe {
+            ptr::write_volatile(uart::DIVIDER, CLOCK_HZ / BAUD);
+            let control =
+                uart::CONTROL_SEND | uart::CONTROL_RECEIVE | uart::CONTROL_RECEIVE_INTERRUPT;
+            ptr::write_volatile(uart::CONTROL, control);
+            NVIC::unmask(Received);
+        }
+        Self {
+            systick,
+            periods: 0,
+        }
+    }
+}
+
+fn uart_state() -> u32 {
+    // SAFETY: a device register whose reading changes nothing.
+    unsafe { ptr::read_volatile(uart::STATE) }
+}
+
+impl Board for Mps2 {
+    const CELL_MM: f32 = 100.0;
+
+    /// A neighbour that goes around the robot.
+    fn detect(&mut self, neighbours: &mut Neighbours<NEIGHBOURS_MAX>) -> bool {
+        self.periods = self.periods.wrapping_add(1);
+        let eighths = (self.periods / CONTROL_HZ % 8) as f32;
+        neighbours.push(Detection {
+            range_mm: Self::CELL_MM,
+            bearing_rad: eighths * core::f32::consts::FRAC_PI_4,
+        });
+        true
+    }
+
+    fn drive(&mut self, _: Motion) {}
+
+    fn receive(&mut self) -> Option<u8> {
+        if uart_state() & uart::STATE_RECEIVED == 0 {
+            return None;
+        }
+        // SAFETY: device registers; reading the data takes the byte.
+        let data = unsafe {
+            ptr::write_volatile(uart::INTERRUPT, uart::INTERRUPT_RECEIVED);
+            ptr::read_volatile(uart::DATA)
+        };
+        NVIC::unpend(Received);
+        Some(data as u8)
+    }
+
+    fn send(&mut self, byte: u8) -> bool {
+        if uart_state() & uart::STATE_SENDING != 0 {
+            return false;
+        }
+        // SAFETY: a device register; writing it sends the byte.
+        unsafe { ptr::write_volatile(uart::DATA, byte.into()) };
+        true
+    }
+
+    fn period_begun(&mut self) -> bool {
+        let begun = self.systick.has_wrapped();
+        if begun {
+            SCB::clear_pendst();
+        }
+        begun
+    }
+
+    fn sleep(&mut self) {
+        // A pending interrupt ends it at once, so nothing that came in the meantime is missed.
+        asm::wfi();
+    }
+
+    /// This machine's watchdog is not used: a debugger would have to feed it.
+    fn feed_watchdog(&mut self) {}
+
+    fn restarted_by_watchdog(&self) -> bool {
+        false
+    }
+
+    fn log(&mut self, report: &Report) {
+        defmt::info!("{}", report);
+    }
+}
+
+/// Flash in the file `flash.bin`, in the directory that QEMU was started in. What has been written
+/// is there after QEMU was killed.
+///
+/// As strict as real flash: words of 4 bytes, pages of 4 KiB, no word written twice.
+#[derive(Debug)]
+pub struct FileFlash {
+    handle: usize,
+}
+
+/// The file cannot be used as flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+pub enum FileError {
+    /// Out of bounds or not aligned.
+    Place(#[defmt(Debug2Format)] NorFlashErrorKind),
+    /// The host's system reports an error.
+    Host,
+    /// The word is not erased.
+    WrittenTwice,
+}
+
+impl NorFlashError for FileError {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Self::Place(kind) => *kind,
+            Self::Host | Self::WrittenTwice => NorFlashErrorKind::Other,
+        }
+    }
+}
+
+impl From<NorFlashErrorKind> for FileError {
+    fn from(kind: NorFlashErrorKind) -> Self {
+        Self::Place(kind)
+    }
+}
+
+/// Bytes erased by one write to the file; between two of them QEMU may be killed.
+const ERASE_STEP: usize = 512;
+
+impl FileFlash {
+    /// Bytes of the flash: room for two slots.
+    pub const CAPACITY: usize = 2 * Self::ERASE_SIZE;
+
+    /// Opens the file, or makes one as it comes from the factory.
+    ///
+    /// # Errors
+    /// [`FileError::Host`].
+    pub fn open() -> Result<Self, FileError> {
+        let handle = match host_open(nr::open::RW_BINARY) {
+            None => host_open(nr::open::RW_TRUNC_BINARY),
+            handle => handle,
+        };
+        let mut flash = Self {
+            handle: handle.ok_or(FileError::Host)?,
+        };
+        // SAFETY: the host reads the handle.
+        let length = unsafe { syscall!(FLEN, flash.handle) };
+        flash.host_fill(length.min(Self::CAPACITY), Self::CAPACITY)?;
+        Ok(flash)
+    }
+
+    fn host_seek(&mut self, at: usize) -> Result<(), FileError> {
+        // SAFETY: the host reads the handle.
+        match unsafe { syscall!(SEEK, self.handle, at) } {
+            0 => Ok(()),
+            _ => Err(FileError::Host),
+        }
+    }
+
+    fn host_read(&mut self, at: usize, bytes: &mut [u8]) -> Result<(), FileError> {
+        self.host_seek(at)?;
+        // SAFETY: the host writes to the bytes, within their length.
+        match unsafe { syscall!(READ, self.handle, bytes.as_mut_ptr(), bytes.len()) } {
+            0 => Ok(()),
+            _ => Err(FileError::Host),
+        }
+    }
+
+    fn host_write(&mut self, at: usize, bytes: &[u8]) -> Result<(), FileError> {
+        self.host_seek(at)?;
+        // SAFETY: the host reads the bytes, within their length.
+        match unsafe { syscall!(WRITE, self.handle, bytes.as_ptr(), bytes.len()) } {
+            0 => Ok(()),
+            _ => Err(FileError::Host),
+        }
+    }
+
+    fn host_fill(&mut self, from: usize, to: usize) -> Result<(), FileError> {
+        for at in (from..to).step_by(ERASE_STEP) {
+            let bytes = [0xff; ERASE_STEP];
+            self.host_write(at, &bytes[..ERASE_STEP.min(to - at)])?;
+        }
+        Ok(())
+    }
+}
+
+fn host_open(mode: usize) -> Option<usize> {
+    let name = c"flash.bin".to_bytes_with_nul();
+    // SAFETY: the host reads the name, which ends with a zero byte, and its length without that.
+    let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.len() - 1) };
+    (handle != usize::MAX).then_some(handle)
+}
+
+impl ErrorType for FileFlash {
+    type Error = FileError;
+}
+
+impl ReadNorFlash for FileFlash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FileError> {
+        check_read(self, offset, bytes.len())?;
+        self.host_read(offset as usize, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        Self::CAPACITY
+    }
+}
+
+impl NorFlash for FileFlash {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = 4096;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FileError> {
+        check_erase(self, from, to)?;
+        self.host_fill(from as usize, to as usize)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FileError> {
+        check_write(self, offset, bytes.len())?;
+        for (index, word) in bytes.chunks(Self::WRITE_SIZE).enumerate() {
+            let at = offset as usize + index * Self::WRITE_SIZE;
+            let mut before = [0; Self::WRITE_SIZE];
+            self.host_read(at, &mut before)?;
+            if before != [0xff; Self::WRITE_SIZE] {
+                return Err(FileError::WrittenTwice);
+            }
+            self.host_write(at, word)?;
+        }
+        Ok(())
+    }
+}

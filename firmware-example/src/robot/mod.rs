@@ -1,0 +1,354 @@
+//! The firmware of a robot: the control loop, and the answers to its host.
+//!
+//! Once a control period: read neighbours, encode them as sensor bits, step, act, report. In
+//! between the robot answers its host. It stands until the host starts it.
+//!
+//! **Safe by itself.** Whatever the genome decides, the robot
+//!
+//! - never drives into a cell that its sensors report occupied, or have not reported on since it
+//!   moved;
+//! - stands while its newest neighbour data is older than [`DATA_PERIODS_MAX`] periods;
+//! - stops its motors before it writes to flash, which may stall the chip;
+//! - is restarted by the watchdog, and so stands, unless it gets to the end of its loop.
+
+mod board;
+
+pub use board::{Board, Motion, NEIGHBOURS_MAX};
+
+use embedded_storage::nor_flash::NorFlash;
+use minimal_surprise_controller::neighbours::{CellSize, InvalidCellSize, Neighbours};
+use minimal_surprise_controller::{
+    Action, Controller, Decision, KERNEL_ID, SensorBits, State, Turn,
+};
+use minimal_surprise_link::{
+    Faults, GenomeInUse, Handler, Identity, Refusal, Report, Server, Stepped, WIRE_BYTES_MAX,
+};
+use minimal_surprise_slots::{Buffer, Defect, PlaceError, Slot, SlotState, Slots, UpdateError};
+
+/// The oldest neighbour data to act on, in control periods.
+pub const DATA_PERIODS_MAX: u32 = 2;
+
+/// Periods between two log lines of a robot that runs.
+const LOG_PERIODS: u32 = 100;
+
+/// The sensor of the cell straight ahead, in every sensor model.
+const AHEAD: u16 = 1;
+
+/// The robot cannot start. The board or the place for its slots is not what it must be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StartError {
+    /// The slots do not fit the flash.
+    Place(PlaceError),
+    /// [`Board::CELL_MM`] is no size.
+    Cell(InvalidCellSize),
+}
+
+/// A robot.
+#[derive(Debug)]
+pub struct Robot<B, F> {
+    server: Server,
+    body: Body<B, F>,
+    /// The answer that is being sent, its length, and how much of it is on the line.
+    outgoing: [u8; WIRE_BYTES_MAX],
+    length: usize,
+    sent: usize,
+}
+
+/// All but the line.
+#[derive(Debug)]
+struct Body<B, F> {
+    board: B,
+    cell: CellSize,
+    neighbours: Neighbours<NEIGHBOURS_MAX>,
+    /// The newest reading, and its age in periods.
+    sensors: SensorBits,
+    data_periods: u32,
+    slots: Slots<F>,
+    room: Buffer,
+    controller: Controller,
+    state: State,
+    report: Report,
+    /// Faults that stay until the next restart.
+    lasting: Faults,
+    periods_to_log: u32,
+}
+
+impl<B: Board, F: NorFlash> Robot<B, F> {
+    /// Switches a robot on whose genome slots are at `offset` in `flash`.
+    ///
+    /// # Errors
+    /// [`StartError`].
+    pub fn start(mut board: B, flash: F, offset: u32) -> Result<Self, StartError> {
+        board.drive(Motion::Stop);
+        let cell = CellSize::from_mm(B::CELL_MM).map_err(StartError::Cell)?;
+        let mut room = Buffer::new();
+        let mut slots = Slots::open(flash, offset, &mut room).map_err(StartError::Place)?;
+        let controller = slots.in_use(&mut room).controller();
+        let lasting = if board.restarted_by_watchdog() {
+            Faults::WATCHDOG
+        } else {
+            Faults::NONE
+        };
+        let mut body = Body {
+            board,
+            cell,
+            neighbours: Neighbours::new(),
+            sensors: SensorBits::NONE,
+            data_periods: DATA_PERIODS_MAX,
+            slots,
+            room,
+            state: State::new(&controller),
+            controller,
+            report: Report::default(),
+            lasting,
+            periods_to_log: 0,
+        };
+        let report = body.telemetry();
+        body.board.log(&report);
+        Ok(Self {
+            server: Server::new(),
+            body,
+            outgoing: [0; WIRE_BYTES_MAX],
+            length: 0,
+            sent: 0,
+        })
+    }
+
+    /// The loop.
+    pub fn run(&mut self) -> ! {
+        loop {
+            self.go_round();
+        }
+    }
+
+    /// Once through the loop.
+    pub fn go_round(&mut self) {
+        let idle = self.talk();
+        if self.body.board.period_begun() {
+            self.body.period();
+            self.body.board.feed_watchdog();
+        } else if idle {
+            self.body.board.sleep();
+        }
+    }
+
+    /// The board.
+    pub fn board(&mut self) -> &mut B {
+        &mut self.body.board
+    }
+
+    /// Takes a byte from the line and puts bytes on it; says whether there was nothing to do.
+    fn talk(&mut self) -> bool {
+        let answer = self.outgoing.get(self.sent..self.length).unwrap_or(&[]);
+        for &byte in answer {
+            if !self.body.board.send(byte) {
+                // Nothing is taken before the answer is gone; the host waits for it.
+                return false;
+            }
+            self.sent += 1;
+        }
+        let Some(byte) = self.body.board.receive() else {
+            return true;
+        };
+        if let Some(answer) = self.server.feed(byte, &mut self.body) {
+            self.length = 0;
+            self.sent = 0;
+            for (place, byte) in self.outgoing.iter_mut().zip(answer) {
+                *place = *byte;
+                self.length += 1;
+            }
+        }
+        false
+    }
+}
+
+impl<B: Board, F: NorFlash> Body<B, F> {
+    /// One control period.
+    fn period(&mut self) {
+        self.neighbours.clear();
+        if self.board.detect(&mut self.neighbours) {
+            let model = self.controller.topology().model();
+            self.sensors = self.neighbours.sensor_bits(model, self.cell);
+            self.data_periods = 0;
+        } else {
+            self.data_periods = self.data_periods.saturating_add(1);
+        }
+        if !self.report.running {
+            return;
+        }
+        if self.data_periods > DATA_PERIODS_MAX {
+            self.board.drive(Motion::Stop);
+        } else {
+            let decision = self.controller.step(&mut self.state, self.sensors);
+            self.count(decision);
+            let motion = self.guarded(decision);
+            self.board.drive(motion);
+        }
+        self.periods_to_log = match self.periods_to_log.checked_sub(1) {
+            Some(periods) => periods,
+            None => {
+                let report = self.telemetry();
+                self.board.log(&report);
+                LOG_PERIODS - 1
+            }
+        };
+    }
+
+    /// What the robot does about a decision: what was decided, unless it might collide. The cell
+    /// ahead counts as occupied unless this period's data says otherwise: since older data the
+    /// robot has moved.
+    fn guarded(&mut self, decision: Decision) -> Motion {
+        match (decision.action, decision.turn) {
+            (Action::Straight, _) if self.data_periods > 0 || self.sensors.bits() & AHEAD != 0 => {
+                count(&mut self.report.held_back);
+                Motion::Stop
+            }
+            (Action::Straight, _) => Motion::Ahead,
+            (Action::Turn, Turn::CounterClockwise) => Motion::Left,
+            (Action::Turn, Turn::Clockwise) => Motion::Right,
+        }
+    }
+
+    fn count(&mut self, decision: Decision) {
+        count(match (decision.action, decision.turn) {
+            (Action::Straight, _) => &mut self.report.straight,
+            (Action::Turn, Turn::CounterClockwise) => &mut self.report.turned_left,
+            (Action::Turn, Turn::Clockwise) => &mut self.report.turned_right,
+        });
+    }
+
+    fn faults(&self) -> Faults {
+        let mut faults = self.lasting;
+        if self.slots.newest().is_none() {
+            faults = faults.and(Faults::NO_GENOME);
+        }
+        for slot in Slot::ALL {
+            faults = match self.slots.state(slot) {
+                SlotState::Damaged(_, Defect::Unreadable) => faults.and(Faults::FLASH),
+                SlotState::Damaged(..) => faults.and(Faults::SLOT_DAMAGED),
+                _ => faults,
+            };
+        }
+        if self.report.running && self.data_periods > DATA_PERIODS_MAX {
+            faults = faults.and(Faults::NEIGHBOURS_STALE);
+        }
+        faults
+    }
+
+    fn standing(&self) -> Result<(), Refusal> {
+        if self.report.running {
+            Err(Refusal::Running)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// What the host is told about an update that failed.
+    fn refusal(&mut self, error: UpdateError<F::Error>) -> Refusal {
+        match error {
+            UpdateError::ImpossibleLength { .. } => Refusal::ImpossibleLength,
+            UpdateError::NotBegun => Refusal::NotBegun,
+            UpdateError::WrongOffset { expected, .. } => Refusal::WrongOffset { expected },
+            UpdateError::TooMuch { .. } | UpdateError::Incomplete { .. } => Refusal::OtherLength,
+            UpdateError::Defect(Defect::OtherContainer { .. } | Defect::Refused(_)) => {
+                Refusal::BadGenome
+            }
+            UpdateError::Flash(_)
+            | UpdateError::NotWritten
+            | UpdateError::CountExhausted
+            | UpdateError::Defect(Defect::Unreadable) => {
+                self.lasting = self.lasting.and(Faults::FLASH);
+                Refusal::Flash
+            }
+        }
+    }
+}
+
+/// One more, unless there is no larger number.
+fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
+}
+
+impl<B: Board, F: NorFlash> Handler for Body<B, F> {
+    fn identify(&mut self) -> Identity<'_> {
+        let genome = match self.slots.newest() {
+            None => GenomeInUse::BuiltIn,
+            Some((slot, header)) => GenomeInUse::Slot {
+                slot: slot.index(),
+                write_count: header.write_count,
+                length: header.length,
+                crc: header.crc,
+            },
+        };
+        Identity {
+            firmware: "robot",
+            version: env!("CARGO_PKG_VERSION"),
+            kernel: KERNEL_ID,
+            genome,
+            running: self.report.running,
+            faults: self.faults(),
+        }
+    }
+
+    fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal> {
+        self.standing()?;
+        // The chip may stall for seconds; wheels that turn would go on turning.
+        self.board.drive(Motion::Stop);
+        let begun = self.slots.begin(length, crc);
+        begun.map_err(|error| self.refusal(error))
+    }
+
+    fn chunk(&mut self, offset: u16, data: &[u8]) -> Result<(), Refusal> {
+        self.standing()?;
+        let taken = self.slots.chunk(offset, data);
+        taken.map_err(|error| self.refusal(error))
+    }
+
+    fn commit(&mut self) -> Result<u32, Refusal> {
+        self.standing()?;
+        let committed = self.slots.commit(&mut self.room);
+        let write_count = committed.map_err(|error| self.refusal(error))?;
+        self.controller = self.slots.in_use(&mut self.room).controller();
+        self.state = State::new(&self.controller);
+        // Sensor bits of another model mean other cells.
+        self.data_periods = DATA_PERIODS_MAX;
+        self.sensors = SensorBits::NONE;
+        Ok(write_count)
+    }
+
+    fn step(&mut self, sensors: SensorBits) -> Result<Stepped, Refusal> {
+        self.standing()?;
+        let decision = self.controller.step(&mut self.state, sensors);
+        self.count(decision);
+        Ok(Stepped {
+            decision,
+            surprise: self.state.surprise(),
+        })
+    }
+
+    fn reset(&mut self) -> Result<(), Refusal> {
+        self.standing()?;
+        self.state = State::new(&self.controller);
+        self.report = Report::default();
+        Ok(())
+    }
+
+    fn start(&mut self) -> Result<(), Refusal> {
+        self.report.running = true;
+        Ok(())
+    }
+
+    fn stop(&mut self) -> Result<(), Refusal> {
+        self.board.drive(Motion::Stop);
+        self.report.running = false;
+        Ok(())
+    }
+
+    fn telemetry(&mut self) -> Report {
+        Report {
+            surprise: self.state.surprise(),
+            faults: self.faults(),
+            ..self.report
+        }
+    }
+}

@@ -1,0 +1,391 @@
+//! Commands for a robot on a serial port, against a robot, and against everything else that may be
+//! on a port.
+#![cfg(target_os = "linux")]
+
+use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Topology};
+use minimal_surprise_link::Handler;
+use serde_json::Value;
+use std::time::Duration;
+use tests::genome::{of_another_kernel, random};
+use tests::link_robot::Flash;
+use tests::program::{Evolver, Finished};
+use tests::pty::{Answer, Device, Fault, PluggedRobot};
+
+/// A folder with two genomes for this arithmetic and one for another.
+fn with_genomes() -> Evolver {
+    let evolver = Evolver::in_empty_folder();
+    let topology = Topology::default();
+    evolver.write("old.genome", &random(1, topology));
+    evolver.write("new.genome", &random(2, topology));
+    let other = of_another_kernel(&random(2, topology));
+    evolver.write("other.genome", &other);
+    evolver
+}
+
+/// A robot that runs the old genome.
+fn with_the_old_genome(evolver: &Evolver, fault: Fault) -> PluggedRobot {
+    let fresh = PluggedRobot::start(Flash::new(), Fault::None);
+    let flashed = flash(evolver, "old.genome", &fresh.device.port);
+    assert_eq!(flashed.code, Some(0), "{flashed:?}");
+    PluggedRobot::start(fresh.stop(), fault)
+}
+
+fn flash(evolver: &Evolver, genome: &str, port: &str) -> Finished {
+    evolver.run(&["flash", genome, "--port", port])
+}
+
+/// The CRC of the genome that the robot says it runs.
+fn crc_in_use(robot: &PluggedRobot) -> String {
+    format!("{:?}", robot.robot().identify().genome)
+}
+
+fn crc_of(container: &[u8]) -> String {
+    let (_, crc) = container.split_last_chunk().unwrap();
+    format!("crc: {}", u32::from_le_bytes(*crc))
+}
+
+/// One message with all these words, and the exit code for bad input.
+fn assert_refused(run: &Finished, words: &[&str]) {
+    assert_eq!(run.code, Some(2), "{run:?}");
+    let errors: Vec<&str> = run
+        .stderr
+        .lines()
+        .filter(|line| line.starts_with("error: "))
+        .collect();
+    let [error] = errors[..] else {
+        panic!("not one error: {run:?}");
+    };
+    assert_eq!(run.stderr.lines().last(), Some(error), "{run:?}");
+    for word in words {
+        assert!(error.contains(word), "no {word:?} in {run:?}");
+    }
+    assert_eq!(run.stdout, "", "{run:?}");
+}
+
+/// Every command that talks to a robot, on this port.
+fn all_commands(port: &str) -> [Vec<&str>; 3] {
+    [
+        vec!["flash", "new.genome", "--port", port],
+        vec!["monitor", "--port", port, "--for", "1"],
+        vec!["hil", "old.genome", "--port", port, "--steps", "5"],
+    ]
+}
+
+#[test]
+fn flash_writes_verifies_starts_and_says_what_runs() {
+    let evolver = with_genomes();
+    let robot = PluggedRobot::start(Flash::new(), Fault::None);
+    let port = robot.device.port.clone();
+    for (count, name) in [(1, "old.genome"), (2, "new.genome"), (3, "new.genome")] {
+        let flashed = flash(&evolver, name, &port);
+        assert_eq!(flashed.code, Some(0), "{flashed:?}");
+        let runs = format!("{port}: robot 0.1.0, running, genome {count} in slot ");
+        assert!(flashed.stdout.starts_with(&runs), "{flashed:?}");
+        assert!(crc_in_use(&robot).contains(&crc_of(&evolver.read(name))));
+        assert!(robot.robot().identify().running);
+    }
+}
+
+#[test]
+fn monitor_shows_surprise_and_actions_second_by_second() {
+    let evolver = with_genomes();
+    let robot = with_the_old_genome(&evolver, Fault::None);
+    robot.robot().start().unwrap();
+    let port = robot.device.port.clone();
+    let arguments = ["monitor", "--port", &port, "--json", "--for", "3"];
+    let watched = std::thread::scope(|scope| {
+        let watching = scope.spawn(|| evolver.run(&arguments));
+        while !watching.is_finished() {
+            robot.robot().period(SensorBits::new(1));
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        watching.join().unwrap()
+    });
+    assert_eq!(watched.code, Some(0), "{watched:?}");
+    let seconds: Vec<Value> = watched
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(seconds.len(), 3, "{watched:?}");
+    let number = |second: &Value, key: &str| second[key].as_u64().unwrap();
+    for pair in seconds.windows(2) {
+        let bits = |key| number(&pair[1], key) - number(&pair[0], key);
+        let recent = bits("mispredicted_bits") as f64 / bits("seen_bits") as f64;
+        assert_eq!(pair[1]["surprise_in_this_second"], recent, "{watched:?}");
+    }
+    let last = &seconds[2];
+    let steps: u64 = ["straight", "turned_left", "turned_right"]
+        .iter()
+        .map(|key| number(last, key))
+        .sum();
+    assert_eq!(number(last, "seen_bits"), 14 * steps);
+    assert_eq!(last["running"], true);
+    assert_eq!(last["faults"], serde_json::json!([]));
+
+    let lines = evolver.run(&["monitor", "--port", &port, "--for", "1"]);
+    for word in [
+        "1 s",
+        "surprise 0.",
+        "straight",
+        "held back",
+        "left",
+        "right",
+    ] {
+        assert!(lines.stdout.contains(word), "no {word:?} in {lines:?}");
+    }
+    assert_eq!(lines.stdout.lines().count(), 1);
+}
+
+#[test]
+fn monitor_ends_at_ctrl_c() {
+    let evolver = with_genomes();
+    let robot = with_the_old_genome(&evolver, Fault::None);
+    let watching = evolver.start(&["monitor", "--port", &robot.device.port]);
+    watching.wait_for_lines(1);
+    let ended = watching.interrupt(Duration::from_secs(10));
+    assert_eq!(ended.code, Some(0), "{ended:?}");
+}
+
+#[test]
+fn hil_ends_with_the_simulations_hash_and_leaves_the_robot_as_it_was() {
+    let evolver = with_genomes();
+    let robot = with_the_old_genome(&evolver, Fault::None);
+    let port = robot.device.port.as_str();
+    let flags = "--grid 8x9 --robots 20 --steps 50 --noise 0.1 --seed 5";
+    let hil = |more: &[&str]| {
+        let flags = flags.split(' ');
+        let arguments: Vec<&str> = ["hil", "old.genome"]
+            .into_iter()
+            .chain(flags)
+            .chain(more.iter().copied())
+            .collect();
+        evolver.run(&arguments)
+    };
+    let simulated = hil(&["--simulate"]);
+    assert_eq!(simulated.code, Some(0), "{simulated:?}");
+    for running in [false, true] {
+        if running {
+            robot.robot().start().unwrap();
+        }
+        let ran = hil(&["--port", port]);
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        assert!(ran.stdout.starts_with(&simulated.stdout), "{ran:?}");
+        assert!(ran.stdout.contains(", equal"), "{ran:?}");
+        assert_eq!(robot.robot().identify().running, running);
+    }
+
+    robot.robot().errs_in_step = Some(30);
+    let ran = hil(&["--port", port]);
+    assert_eq!(ran.code, Some(1), "{ran:?}");
+    assert!(ran.stdout.contains(", different"), "{ran:?}");
+    assert!(!ran.stdout.contains(simulated.stdout.trim()), "{ran:?}");
+    assert!(
+        ran.stderr.contains("in step 31 the robot decided"),
+        "{ran:?}"
+    );
+}
+
+#[test]
+fn hil_wants_the_same_genome_on_the_robot() {
+    let evolver = with_genomes();
+    let robot = with_the_old_genome(&evolver, Fault::None);
+    let port = robot.device.port.as_str();
+    let ran = evolver.run(&["hil", "new.genome", "--port", port]);
+    let command = format!("evolver flash new.genome --port {port}");
+    assert_refused(&ran, &["the robot runs genome 1", &command]);
+    let fresh = PluggedRobot::start(Flash::new(), Fault::None);
+    let ran = evolver.run(&["hil", "new.genome", "--port", &fresh.device.port]);
+    assert_refused(&ran, &["the built-in genome"]);
+}
+
+#[test]
+fn bad_flags_name_the_flag_the_value_and_what_is_valid() {
+    let evolver = with_genomes();
+    let runs = [
+        (
+            "hil old.genome --simulate --grid 2x9",
+            "--grid = 2x9: a grid of 2x9",
+        ),
+        (
+            "hil old.genome --simulate --steps none",
+            "--steps = none: expected a whole number from 1",
+        ),
+        (
+            "monitor --port nowhere --for 0",
+            "--for = 0: expected a whole number from 1",
+        ),
+        (
+            "flash old.genome --port nowhere --baud fast",
+            "--baud = fast: expected a whole number from 1",
+        ),
+        ("hil . --simulate --seed 1", "--seed and a run directory"),
+        ("hil . --simulate", "no complete run"),
+    ];
+    for (arguments, words) in runs {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        assert_refused(&evolver.run(&arguments), &[words]);
+    }
+    let neither = evolver.run(&["hil", "old.genome"]);
+    assert_eq!(neither.code, Some(2), "{neither:?}");
+    let both = evolver.run(&["hil", "old.genome", "--simulate", "--port", "nowhere"]);
+    assert_eq!(both.code, Some(2), "{both:?}");
+}
+
+#[test]
+fn a_port_that_is_none_is_refused() {
+    let evolver = with_genomes();
+    for arguments in all_commands("/dev/nowhere") {
+        let run = evolver.run(&arguments);
+        assert_refused(&run, &["--port = /dev/nowhere: no such port"]);
+    }
+    for arguments in all_commands("new.genome") {
+        let run = evolver.run(&arguments);
+        assert_refused(&run, &["--port = new.genome: a file or folder"]);
+    }
+    assert_refused(&flash(&evolver, "new.genome", "/dev/null"), &["/dev/null"]);
+}
+
+#[test]
+fn a_port_that_says_nothing_is_refused() {
+    let evolver = with_genomes();
+    let silent = Device::plug_in(|_| Answer::Bytes(Vec::new()));
+    for arguments in all_commands(&silent.port) {
+        let run = evolver.run(&arguments);
+        assert_refused(&run, &[&silent.port, "silence for 2.", "115200 baud"]);
+    }
+}
+
+#[test]
+fn another_device_is_refused() {
+    let evolver = with_genomes();
+    let another = |device: &Device, words: &str| {
+        for arguments in all_commands(&device.port) {
+            let run = evolver.run(&arguments);
+            assert_refused(&run, &[&device.port, "another device is talking", words]);
+        }
+    };
+    let echo = Device::plug_in(|bytes| Answer::Bytes(bytes.to_vec()));
+    another(&echo, "sends back");
+    let modem = Device::plug_in(|_| Answer::Bytes(b"ERROR\r\n".to_vec()));
+    another(&modem, "bytes without a message");
+    let newer = Device::plug_in(|_| {
+        let message = [2_u8, 1, 0, 0];
+        let mut wire = [0; 32];
+        let length = minimal_surprise_link::encode(&message, &mut wire).unwrap();
+        Answer::Bytes(wire[..length].to_vec())
+    });
+    another(&newer, "speaks version 2 of the protocol");
+}
+
+#[test]
+fn a_device_that_never_stops_talking_is_refused() {
+    let evolver = with_genomes();
+    let compass = Device::talking(b"$HCHDG,101.1,,,7.1,W*3C\r\n");
+    for arguments in all_commands(&compass.port) {
+        let run = evolver.run(&arguments);
+        assert_refused(&run, &["another device is talking", "without a message"]);
+    }
+}
+
+#[test]
+fn a_genome_for_another_kernel_is_refused_before_the_robot_is_asked() {
+    let evolver = with_genomes();
+    let robot = with_the_old_genome(&evolver, Fault::None);
+    let before = crc_in_use(&robot);
+    let run = flash(&evolver, "other.genome", &robot.device.port);
+    assert_refused(
+        &run,
+        &["other.genome: evolved for kernel", "this controller"],
+    );
+    assert_eq!(robot.robot().done, 0);
+    assert_eq!(crc_in_use(&robot), before);
+}
+
+#[test]
+fn a_robot_of_another_kernel_is_refused_before_anything_is_stopped_or_erased() {
+    let evolver = with_genomes();
+    let robot = with_the_old_genome(&evolver, Fault::None);
+    let before = crc_in_use(&robot);
+    let mut kernel = KERNEL_ID;
+    kernel.0[0] ^= 1;
+    robot.robot().kernel = kernel;
+    for arguments in [
+        &all_commands(&robot.device.port)[0],
+        &all_commands(&robot.device.port)[2],
+    ] {
+        let run = evolver.run(arguments);
+        let words = format!(
+            "the robot is kernel {}, this program is",
+            KernelId(kernel.0)
+        );
+        assert_refused(&run, &[&words]);
+    }
+    assert_eq!(robot.robot().done, 0);
+    assert_eq!(crc_in_use(&robot), before);
+}
+
+#[test]
+fn a_line_pulled_half_way_leaves_the_old_genome_in_use() {
+    let evolver = with_genomes();
+    // 1 is stopping, 2 beginning, the rest chunks; the last one is committing.
+    for done in 1..=6 {
+        for (fault, words) in [
+            (Fault::PulledAfter(done), "the line broke"),
+            (Fault::MuteAfter(done), "no answer any more"),
+        ] {
+            // The longest time-out is that of erasing.
+            if fault == Fault::MuteAfter(2) {
+                continue;
+            }
+            let robot = with_the_old_genome(&evolver, fault);
+            let run = flash(&evolver, "new.genome", &robot.device.port);
+            let keeps = if done == 1 {
+                "starting or stopping"
+            } else {
+                "it keeps the genome that it had"
+            };
+            assert_refused(&run, &[&robot.device.port, words, keeps]);
+            let restarted = PluggedRobot::start(robot.stop(), Fault::None);
+            let old = crc_of(&evolver.read("old.genome"));
+            assert!(crc_in_use(&restarted).contains(&old), "{fault:?}");
+            let again = flash(&evolver, "new.genome", &restarted.device.port);
+            assert_eq!(again.code, Some(0), "{again:?}");
+        }
+    }
+}
+
+#[test]
+fn a_line_pulled_during_monitor_or_hil_is_told() {
+    let evolver = with_genomes();
+    let robot = with_the_old_genome(&evolver, Fault::PulledAfter(20));
+    let run = evolver.run(&["hil", "old.genome", "--port", &robot.device.port]);
+    assert_refused(&run, &["the line broke while the robot was stepping"]);
+    let robot = with_the_old_genome(&evolver, Fault::MuteAfter(20));
+    let run = evolver.run(&["hil", "old.genome", "--port", &robot.device.port]);
+    assert_refused(&run, &["no answer any more, while the robot was stepping"]);
+
+    let robot = with_the_old_genome(&evolver, Fault::None);
+    let port = robot.device.port.clone();
+    let run = std::thread::scope(|scope| {
+        let watching = scope.spawn(|| evolver.run(&["monitor", "--port", &port]));
+        std::thread::sleep(Duration::from_millis(1500));
+        drop(robot);
+        watching.join().unwrap()
+    });
+    assert_eq!(run.code, Some(2), "{run:?}");
+    let told = "the line broke while the robot was reporting";
+    assert!(run.stderr.contains(told), "{run:?}");
+}
+
+#[test]
+fn a_commit_whose_answer_is_lost_is_found_out_about() {
+    let evolver = with_genomes();
+    let chunks = evolver.read("new.genome").len().div_ceil(128) as u64;
+    let robot = with_the_old_genome(&evolver, Fault::MuteAfter(3 + chunks));
+    let run = flash(&evolver, "new.genome", &robot.device.port);
+    let words = "either the genome that it had or the new one: run the command again";
+    assert_refused(&run, &["committing a genome", words]);
+    let new = crc_of(&evolver.read("new.genome"));
+    assert!(crc_in_use(&robot).contains(&new));
+}

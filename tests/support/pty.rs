@@ -1,0 +1,177 @@
+//! Devices behind a serial port that is none: a pseudo-terminal, with a thread at its other end.
+
+use crate::link_robot::{Flash, LinkRobot};
+use minimal_surprise_link::Server;
+use nix::fcntl::OFlag;
+use nix::pty::{PtyMaster, grantpt, posix_openpt, ptsname_r, unlockpt};
+use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
+use std::fs::File;
+use std::io::{ErrorKind, Read, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+/// A device on a serial port. Dropping it unplugs it.
+#[derive(Debug)]
+pub struct Device {
+    /// The name of its port.
+    pub port: String,
+    /// The port, held open: without anyone there, the other end would read errors.
+    held: Option<File>,
+    unplugged: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// What comes of bytes that have arrived.
+pub enum Answer {
+    /// These bytes.
+    Bytes(Vec<u8>),
+    /// The line is pulled.
+    Unplugged,
+}
+
+impl Device {
+    /// Plugs a device in that answers whatever arrives.
+    ///
+    /// # Panics
+    /// If there are no pseudo-terminals to be had.
+    #[must_use]
+    pub fn plug_in(mut answer: impl FnMut(&[u8]) -> Answer + Send + 'static) -> Self {
+        Self::with_thread(move |mut master, unplugged| {
+            let mut buffer = [0; 256];
+            while !unplugged.load(Ordering::Relaxed) {
+                let count = match master.read(&mut buffer) {
+                    Ok(count) => count,
+                    Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                        thread::sleep(Duration::from_micros(100));
+                        continue;
+                    }
+                    Err(_) => break,
+                };
+                match answer(&buffer[..count]) {
+                    Answer::Bytes(bytes) if master.write_all(&bytes).is_ok() => {}
+                    _ => break,
+                }
+            }
+        })
+    }
+
+    /// Plugs a device in that says the same again and again, whether anyone listens or not.
+    ///
+    /// # Panics
+    /// If there are no pseudo-terminals to be had.
+    #[must_use]
+    pub fn talking(bytes: &'static [u8]) -> Self {
+        Self::with_thread(move |mut master, unplugged| {
+            while !unplugged.load(Ordering::Relaxed) {
+                // What nobody takes is lost.
+                let _ = master.write(bytes);
+                thread::sleep(Duration::from_millis(5));
+            }
+        })
+    }
+
+    fn with_thread(run: impl FnOnce(PtyMaster, &AtomicBool) + Send + 'static) -> Self {
+        // What other tests start must not hold the line's ends, and nobody waits for a thread that
+        // waits for bytes.
+        let flags = OFlag::O_RDWR | OFlag::O_NOCTTY | OFlag::O_CLOEXEC | OFlag::O_NONBLOCK;
+        let master = posix_openpt(flags).expect("a pseudo-terminal");
+        let port = name(&master);
+        let held = File::options()
+            .read(true)
+            .write(true)
+            .open(&port)
+            .expect("the other end");
+        let mut raw = tcgetattr(&held).expect("its settings");
+        cfmakeraw(&mut raw);
+        tcsetattr(&held, SetArg::TCSANOW, &raw).expect("its settings");
+        let unplugged = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&unplugged);
+        Self {
+            port,
+            held: Some(held),
+            unplugged,
+            thread: Some(thread::spawn(move || run(master, &flag))),
+        }
+    }
+}
+
+fn name(master: &PtyMaster) -> String {
+    grantpt(master).expect("it is ours");
+    unlockpt(master).expect("it is ours");
+    ptsname_r(master).expect("it has a name")
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        self.unplugged.store(true, Ordering::Relaxed);
+        self.held = None;
+        if let Some(thread) = self.thread.take() {
+            // Whatever it panicked about has been printed.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// A robot on a serial port.
+#[derive(Debug)]
+pub struct PluggedRobot {
+    robot: Arc<Mutex<LinkRobot>>,
+    /// Its line.
+    pub device: Device,
+}
+
+/// What is wrong with a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// Nothing.
+    None,
+    /// It is pulled when the robot has done so much.
+    PulledAfter(u64),
+    /// The robot's answers are lost from then on.
+    MuteAfter(u64),
+}
+
+impl PluggedRobot {
+    /// Switches a robot on and plugs it in.
+    #[must_use]
+    pub fn start(flash: Flash, fault: Fault) -> Self {
+        let robot = Arc::new(Mutex::new(LinkRobot::start(flash)));
+        let behind = Arc::clone(&robot);
+        let mut server = Server::new();
+        let device = Device::plug_in(move |bytes| {
+            let mut robot = lock(&behind);
+            let mut answers = Vec::new();
+            for &byte in bytes {
+                answers.extend_from_slice(server.feed(byte, &mut *robot).unwrap_or(&[]));
+            }
+            match fault {
+                Fault::PulledAfter(done) if robot.done >= done => Answer::Unplugged,
+                Fault::MuteAfter(done) if robot.done >= done => Answer::Bytes(Vec::new()),
+                _ => Answer::Bytes(answers),
+            }
+        });
+        Self { robot, device }
+    }
+
+    /// The robot.
+    pub fn robot(&self) -> MutexGuard<'_, LinkRobot> {
+        lock(&self.robot)
+    }
+
+    /// Its flash, after it was unplugged and switched off.
+    ///
+    /// # Panics
+    /// If the robot has panicked.
+    #[must_use]
+    pub fn stop(self) -> Flash {
+        drop(self.device);
+        let robot = Arc::into_inner(self.robot).expect("the thread has ended");
+        robot.into_inner().expect("it has not panicked").stop()
+    }
+}
+
+fn lock(robot: &Mutex<LinkRobot>) -> MutexGuard<'_, LinkRobot> {
+    robot.lock().expect("the robot has not panicked")
+}

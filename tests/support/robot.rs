@@ -1,0 +1,178 @@
+//! The robot under QEMU, on a serial port.
+
+use crate::firmware::{Firmware, QEMU, no_qemu};
+use crate::tools::Missing;
+use minimal_surprise_link::{Client, GaveUp, Reply, Request};
+use minimal_surprise_slots::crc_of;
+use serialport::SerialPort;
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// As in `firmware-example/src/bin/robot.rs`. Time goes by as on the wall.
+const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 -nographic -monitor none \
+    -serial pty -semihosting-config enable=on,target=native -kernel";
+
+/// A robot that is switched on. Dropping it kills it.
+#[derive(Debug)]
+pub struct QemuRobot {
+    child: Child,
+    /// Its serial port.
+    pub port: String,
+}
+
+impl QemuRobot {
+    /// Switches it on. Its flash is `flash.bin` in `folder`, made if it is not there; what it logs
+    /// is dropped.
+    ///
+    /// # Errors
+    /// [`Missing`] if there is no QEMU.
+    ///
+    /// # Panics
+    /// If QEMU does not say which port it is.
+    pub fn start(firmware: &Firmware, folder: &Path) -> Result<Self, Missing> {
+        let child = Command::new(QEMU)
+            .args(QEMU_ARGUMENTS.split_whitespace())
+            .arg(firmware.elf("robot"))
+            .current_dir(folder)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn();
+        let mut child = match child {
+            Ok(child) => child,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(no_qemu()),
+            Err(error) => panic!("{QEMU}: {error}"),
+        };
+        let mut output = BufReader::new(child.stdout.take().expect("stdout is a pipe"));
+        let mut line = Vec::new();
+        output
+            .read_until(b'\n', &mut line)
+            .expect("QEMU can be read");
+        let line = String::from_utf8_lossy(&line).into_owned();
+        let port = line
+            .split_whitespace()
+            .find(|word| word.starts_with("/dev"));
+        let port = port.unwrap_or_else(|| panic!("no serial port in {line:?}"));
+        let port = port.to_owned();
+        // A full pipe would stop the robot at its next log line.
+        thread::spawn(move || io::copy(&mut output, &mut io::sink()));
+        Ok(Self { child, port })
+    }
+
+    /// Pulls its plug: SIGKILL.
+    ///
+    /// # Panics
+    /// If it cannot be killed.
+    pub fn kill(mut self) {
+        self.child.kill().expect("QEMU can be killed");
+        self.child.wait().expect("QEMU has ended");
+    }
+}
+
+impl Drop for QemuRobot {
+    fn drop(&mut self) {
+        // It may have ended by itself; nothing is left to do about it then.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The host's end of a robot's line.
+pub struct Line {
+    port: Box<dyn SerialPort>,
+    client: Client,
+}
+
+/// No answer.
+#[derive(Debug)]
+pub enum LineError {
+    /// The port reports an error: the robot is off.
+    Port(io::Error),
+    /// The robot does not answer.
+    GaveUp(GaveUp),
+}
+
+impl From<io::Error> for LineError {
+    fn from(error: io::Error) -> Self {
+        Self::Port(error)
+    }
+}
+
+impl Line {
+    /// Opens a port, and a session of this number.
+    ///
+    /// # Errors
+    /// If there is no such port.
+    pub fn open(port: &str, session: u32) -> io::Result<Self> {
+        let port = serialport::new(port, 115_200)
+            .timeout(Duration::from_millis(10))
+            .open()?;
+        Ok(Self {
+            port,
+            client: Client::new(session, Client::ATTEMPTS_MAX),
+        })
+    }
+
+    /// Asks, and hands over the answer.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    ///
+    /// # Panics
+    /// If the request cannot be sent.
+    pub fn ask<T>(
+        &mut self,
+        request: &Request<'_>,
+        answer: impl FnOnce(Reply<'_>) -> T,
+    ) -> Result<T, LineError> {
+        let wait = Duration::from_millis(request.timeout_ms().into());
+        let frame = self.client.request(request).expect("a request to send");
+        self.port.write_all(frame)?;
+        let mut overdue = Instant::now() + wait;
+        loop {
+            let mut bytes = [0; 64];
+            let arrived = match self.port.read(&mut bytes) {
+                Ok(0) => return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into()),
+                Ok(arrived) => arrived,
+                Err(error) if error.kind() == io::ErrorKind::TimedOut => 0,
+                Err(error) => return Err(error.into()),
+            };
+            for &byte in &bytes[..arrived] {
+                if let Some(reply) = self.client.feed(byte) {
+                    return Ok(answer(reply));
+                }
+            }
+            if Instant::now() > overdue {
+                let frame = self.client.timed_out().map_err(LineError::GaveUp)?;
+                self.port.write_all(frame)?;
+                overdue = Instant::now() + wait;
+            }
+        }
+    }
+
+    /// Writes a genome to a robot that stands, in an open session. Says the write count.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    ///
+    /// # Panics
+    /// If the robot refuses.
+    pub fn write(&mut self, container: &[u8], chunk_bytes: usize) -> Result<u32, LineError> {
+        let done = |reply: Reply<'_>| assert_eq!(reply, Reply::Done);
+        let begin = Request::Begin {
+            length: container.len().try_into().expect("a container's length"),
+            crc: crc_of(container).expect("a container's CRC"),
+        };
+        self.ask(&begin, done)?;
+        for (index, data) in container.chunks(chunk_bytes).enumerate() {
+            let offset = (index * chunk_bytes) as u16;
+            self.ask(&Request::Chunk { offset, data }, done)?;
+        }
+        self.ask(&Request::Commit, |reply| match reply {
+            Reply::Committed { write_count } => write_count,
+            other => panic!("{other:?}"),
+        })
+    }
+}

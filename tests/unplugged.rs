@@ -1,0 +1,314 @@
+//! The robot's plug is pulled while a genome is written to it over the line: QEMU is killed, at
+//! chosen flash operations and at random moments. `TEST_ALL=1` kills it more often.
+//!
+//! A failure prints which kill it was; kills depend on [`SEED`] and their number alone, as far as
+//! a host's clock lets them.
+
+use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, Provenance, encode};
+use minimal_surprise_controller::{
+    Controller, EncodedGenome, Genome, KERNEL_ID, SensorBits, State, Topology,
+};
+use minimal_surprise_link::{CHUNK_BYTES_MAX, GenomeInUse, Reply, Request};
+use minimal_surprise_slots::{COMMIT_AT, CONTAINER_AT, crc_of, slot_bytes};
+use rand_chacha::ChaCha8Rng;
+use rand_core::{Rng, SeedableRng};
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+use std::thread;
+use std::time::{Duration, Instant};
+use tests::firmware::{self, Firmware};
+use tests::full::all_cases;
+use tests::robot::{Line, LineError, QemuRobot};
+use tests::tools::{Missing, require};
+
+/// Seed of the genomes and of the kills.
+const SEED: u64 = 11;
+/// Kills, and kills with `TEST_ALL=1`.
+const KILLS: u32 = 40;
+const KILLS_ALL: u32 = 200;
+/// Bytes that the robot erases at a time, and in one step of that.
+const ERASE_BYTES: usize = 4096;
+const ERASE_STEP_BYTES: usize = 512;
+/// Bytes of a word of its flash.
+const WORD_BYTES: usize = 4;
+type Word = [u8; WORD_BYTES];
+const ERASED: Word = [0xff; WORD_BYTES];
+/// Where a slot's header has the write count.
+const WRITE_COUNT_AT: usize = 4;
+/// Longest to wait for a flash operation.
+const OPERATION_WAIT: Duration = Duration::from_secs(20);
+
+/// When to pull the plug.
+#[derive(Clone, Copy, Debug)]
+enum Kill {
+    /// As soon as this step of the slot's erase is done.
+    Erased { step: usize },
+    /// As soon as the word at this place in the slot is written.
+    Written { at: usize },
+    /// After so much of the time that an update takes, in thousandths.
+    After { thousandths: u32 },
+}
+
+/// The bytes of the slot that is written, in the file.
+struct SlotBytes {
+    flash: File,
+    start: u64,
+    before: Vec<u8>,
+}
+
+impl SlotBytes {
+    fn open(folder: &Path, start: u64) -> Self {
+        let flash = File::open(folder.join("flash.bin")).unwrap();
+        let mut before = vec![0; slot_bytes(ERASE_BYTES)];
+        flash.read_exact_at(&mut before, start).unwrap();
+        Self {
+            flash,
+            start,
+            before,
+        }
+    }
+
+    fn word(&self, at: usize) -> Word {
+        let mut word = ERASED;
+        let place = self.start + at as u64;
+        self.flash.read_exact_at(&mut word, place).unwrap();
+        word
+    }
+
+    /// Whether the word is no longer what it was before the update.
+    fn is_changed(&self, at: usize) -> bool {
+        self.word(at) != self.before[at..at + WORD_BYTES]
+    }
+
+    /// The last word that an erase step takes away; at the slot's start the write count, for every
+    /// header begins with the same word.
+    fn last_word(&self, step: usize) -> usize {
+        let from = step * ERASE_STEP_BYTES;
+        let mut words = (from..from + ERASE_STEP_BYTES).step_by(WORD_BYTES);
+        words
+            .rfind(|&at| self.before[at..at + WORD_BYTES] != ERASED)
+            .unwrap_or(WRITE_COUNT_AT)
+    }
+}
+
+impl Kill {
+    /// Every second kill is at a flash operation. These go evenly through all of an update: the
+    /// steps of the erase, the words of the header, of the container, of the commit record.
+    fn choose(index: u32, kills: u32, container_bytes: usize) -> Self {
+        if index % 2 == 1 {
+            let mut rng = ChaCha8Rng::seed_from_u64(SEED + u64::from(index));
+            return Self::After {
+                thousandths: rng.next_u32() % 1000,
+            };
+        }
+        let words = |from: u32, bytes: usize| {
+            (from as usize..from as usize + bytes)
+                .step_by(WORD_BYTES)
+                .map(|at| Self::Written { at })
+        };
+        // Beyond the container there is nothing that an erase would change.
+        let steps = (CONTAINER_AT as usize + container_bytes).div_ceil(ERASE_STEP_BYTES);
+        let operations: Vec<Self> = (0..steps)
+            .map(|step| Self::Erased { step })
+            .chain(words(0, 16))
+            // One in so many: each is as dangerous, and there are far more than of the others.
+            .chain(words(CONTAINER_AT, container_bytes).step_by(16))
+            .chain(words(COMMIT_AT, 8))
+            .collect();
+        let place = (index / 2) as usize * (operations.len() - 1) / (kills / 2 - 1) as usize;
+        operations[place]
+    }
+
+    /// Waits for the moment.
+    fn wait(self, slot: &SlotBytes, update: Duration) {
+        let overdue = Instant::now() + OPERATION_WAIT;
+        let until = |is_there: &dyn Fn() -> bool| {
+            while !is_there() {
+                assert!(Instant::now() < overdue, "{self:?} does not happen");
+            }
+        };
+        match self {
+            Self::Erased { step } => {
+                let at = slot.last_word(step);
+                until(&|| slot.is_changed(at));
+            }
+            // All is erased before the first word of the header is written.
+            Self::Written { at } => {
+                until(&|| slot.is_changed(WRITE_COUNT_AT));
+                if at >= WRITE_COUNT_AT {
+                    until(&|| slot.word(WRITE_COUNT_AT) != ERASED);
+                }
+                until(&|| slot.word(at) != ERASED);
+            }
+            Self::After { thousandths } => thread::sleep(update * thousandths / 1000),
+        }
+    }
+}
+
+/// Says which kill it was if the test fails.
+struct Failing(u32, Kill);
+
+impl Drop for Failing {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            println!("seed {SEED}, kill {}: {:?}", self.0, self.1);
+        }
+    }
+}
+
+/// The genome container of one generation, of any topology.
+fn container(generation: u32) -> Vec<u8> {
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED + u64::from(generation));
+    // A network that predicts everything makes the longest container; kills are spread over that.
+    let topology = match generation % 2 {
+        0 => Topology::default(),
+        _ => Topology::ALL[generation as usize / 2 % Topology::ALL.len()],
+    };
+    let genome = Genome::random(topology, &mut rng);
+    let provenance = Provenance {
+        seed: Some(SEED),
+        generation,
+        ..Provenance::default()
+    };
+    let mut buffer = [0; CONTAINER_BYTES_MAX];
+    encode(&genome, provenance, &mut buffer).unwrap().to_vec()
+}
+
+/// A robot that is switched on, and its line.
+struct Robot {
+    qemu: QemuRobot,
+    line: Line,
+    /// What it said when it was asked first.
+    genome: GenomeInUse,
+}
+
+impl Robot {
+    fn start(firmware: &Firmware, folder: &Path, session: u32) -> Result<Self, Missing> {
+        let qemu = QemuRobot::start(firmware, folder)?;
+        let mut line = Line::open(&qemu.port, session).unwrap();
+        let identified = line.ask(&Request::Identify, |reply| match reply {
+            Reply::Identity(identity) => {
+                assert_eq!((identity.firmware, identity.kernel), ("robot", KERNEL_ID));
+                assert!(!identity.running);
+                identity.genome
+            }
+            other => panic!("{other:?}"),
+        });
+        Ok(Self {
+            genome: identified.unwrap(),
+            qemu,
+            line,
+        })
+    }
+
+    /// Shows that the genome is the one that decides.
+    fn must_run(&mut self, container: &[u8], rng: &mut ChaCha8Rng) {
+        let genome = EncodedGenome::decode(container).unwrap();
+        let controller = Controller::from_encoded(&genome);
+        let mut state = State::new(&controller);
+        self.line
+            .ask(&Request::Reset, |reply| assert_eq!(reply, Reply::Done))
+            .unwrap();
+        for _ in 0..8 {
+            let sensors = SensorBits::new(rng.next_u32() as u16);
+            let expected = controller.step(&mut state, sensors);
+            let stepped = self
+                .line
+                .ask(&Request::Step { sensors }, |reply| match reply {
+                    Reply::Stepped(stepped) => stepped,
+                    other => panic!("{other:?}"),
+                });
+            let stepped = stepped.unwrap();
+            assert_eq!(
+                (stepped.decision, stepped.surprise),
+                (expected, state.surprise())
+            );
+        }
+    }
+
+    /// Writes a genome and says how long that took.
+    fn update(&mut self, container: &[u8]) -> Duration {
+        let started = Instant::now();
+        self.line.write(container, CHUNK_BYTES_MAX).unwrap();
+        started.elapsed()
+    }
+}
+
+/// Which of its slots a robot writes next, as a place in the file.
+fn slot_to_write(genome: GenomeInUse) -> u64 {
+    match genome {
+        GenomeInUse::Slot { slot: 0, .. } => slot_bytes(ERASE_BYTES) as u64,
+        GenomeInUse::Slot { .. } | GenomeInUse::BuiltIn => 0,
+    }
+}
+
+/// Whether the genome in use is this one.
+fn is_in_use(genome: GenomeInUse, container: &[u8]) -> bool {
+    matches!(genome, GenomeInUse::Slot { crc, .. } if Some(crc) == crc_of(container))
+}
+
+#[test]
+fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
+    let Some(firmware) = require(firmware::build()) else {
+        return;
+    };
+    let kills = if all_cases() { KILLS_ALL } else { KILLS };
+    let folder = tempfile::tempdir().unwrap();
+    let Some(mut robot) = require(Robot::start(&firmware, folder.path(), 0)) else {
+        return;
+    };
+    assert_eq!(robot.genome, GenomeInUse::BuiltIn);
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let mut old = container(0);
+    // Both slots have been in use before the first kill: there is something to erase.
+    robot.update(&container(u32::MAX));
+    let mut update_time = robot.update(&old);
+    let mut slot = slot_bytes(ERASE_BYTES) as u64;
+
+    let (mut olds, mut news, mut unheard) = (0, 0, 0);
+    let started = Instant::now();
+    for index in 0..kills {
+        let new = container(index + 1);
+        let kill = Kill::choose(index, kills, old.len().min(new.len()));
+        let _failing = Failing(index, kill);
+        slot = slot_bytes(ERASE_BYTES) as u64 - slot;
+        let slot_bytes = SlotBytes::open(folder.path(), slot);
+        let Robot { qemu, mut line, .. } = robot;
+        let written = thread::scope(|scope| {
+            let writer = scope.spawn(|| line.write(&new, CHUNK_BYTES_MAX));
+            kill.wait(&slot_bytes, update_time);
+            qemu.kill();
+            writer.join().unwrap()
+        });
+
+        robot = Robot::start(&firmware, folder.path(), index + 1).unwrap();
+        let runs_new = is_in_use(robot.genome, &new);
+        let runs_old = is_in_use(robot.genome, &old);
+        assert!(runs_new || runs_old, "{:?}", robot.genome);
+        robot.must_run(if runs_new { &new } else { &old }, &mut rng);
+        match written {
+            Ok(_) => assert!(runs_new, "acknowledged, and gone"),
+            Err(LineError::Port(_)) if runs_new => unheard += 1,
+            Err(LineError::Port(_)) => {}
+            Err(error) => panic!("{error:?}"),
+        }
+        if runs_new {
+            news += 1;
+        } else {
+            olds += 1;
+        }
+
+        slot = slot_to_write(robot.genome);
+        update_time = robot.update(&new);
+        robot.must_run(&new, &mut rng);
+        old = new;
+    }
+    println!(
+        "{kills} kills in {:.0?}: {olds} times the old genome, {news} times the new one, \
+         {unheard} of these unacknowledged; seed {SEED}",
+        started.elapsed()
+    );
+    // Or the kills come when nothing happens.
+    assert!(olds > kills / 2 && news > 0, "{olds} {news}");
+}
