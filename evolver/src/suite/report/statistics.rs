@@ -59,8 +59,7 @@ pub fn wilson(successes: f64, of: f64) -> Option<Interval> {
     let share = successes / of;
     let z2 = Z_95 * Z_95;
     let middle = (share + z2 / (2.0 * of)) / (1.0 + z2 / of);
-    let half =
-        Z_95 / (1.0 + z2 / of) * (share * (1.0 - share) / of + z2 / (4.0 * of * of)).sqrt();
+    let half = Z_95 / (1.0 + z2 / of) * (share * (1.0 - share) / of + z2 / (4.0 * of * of)).sqrt();
     Some(Interval {
         low: (middle - half).max(0.0),
         high: (middle + half).min(1.0),
@@ -116,12 +115,14 @@ pub fn fisher(first: &[u32], second: &[u32]) -> Test {
         .collect();
     let row: u32 = columns.iter().map(|&(one, _)| one).sum();
     let totals: Vec<u32> = columns.iter().map(|&(_, total)| total).collect();
-    let observed: f64 = columns.iter().map(|&(one, total)| ln_choose(total, one)).sum();
-    let largest = totals.iter().copied().max().unwrap_or(0);
-    let tables = totals
+    let observed: f64 = columns
         .iter()
-        .fold(1_u64, |product, &total| product.saturating_mul(u64::from(total) + 1))
-        / (u64::from(largest) + 1);
+        .map(|&(one, total)| ln_choose(total, one))
+        .sum();
+    let largest = totals.iter().copied().max().unwrap_or(0);
+    let tables = totals.iter().fold(1_u64, |product, &total| {
+        product.saturating_mul(u64::from(total) + 1)
+    }) / (u64::from(largest) + 1);
     if tables <= EXACT_TABLES_MAX {
         Test {
             name: "Fisher's exact test",
@@ -318,7 +319,7 @@ mod tests {
         // R: wilcox.test(first, second, exact = FALSE)
         let first = [0.80, 0.83, 1.89, 1.04, 1.45, 1.38, 1.91, 1.64, 0.73, 1.46];
         let second = [1.15, 0.88, 0.90, 0.74, 1.21];
-        assert_close(mann_whitney(&first, &second).p, 0.2448, 0.02);
+        assert_close(mann_whitney(&first, &second).p, 0.2446, 1e-4);
         assert_eq!(mann_whitney(&[1.0, 1.0], &[1.0]).p, 1.0);
     }
 
