@@ -9,7 +9,7 @@ use crate::report::suite_progress::SuiteProgress;
 use crate::settings::count;
 use crate::suite::plan::{Plan, PlannedRun};
 use crate::suite::work::{Progress, Shard, Worked, progress, work_on};
-use crate::suite::{PAPER, Suite, slurm};
+use crate::suite::{PAPER, Suite, report, slurm};
 use clap::{Args, Subcommand, ValueEnum};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -44,6 +44,8 @@ pub enum Verb {
     },
     /// Say how many runs are done.
     Status(Choice),
+    /// Write the report: tables, figures and findings, from the runs that are done.
+    Report(Choice),
     /// Hand the runs to a cluster.
     Submit {
         /// Which runs.
@@ -181,12 +183,22 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
     let (Verb::Plan(choice)
     | Verb::Run { choice, .. }
     | Verb::Status(choice)
+    | Verb::Report(choice)
     | Verb::Submit { choice, .. }) = verb;
     let plan = plan(&read.suite, choice)?;
     let directory = directory(&read.suite, choice);
     match verb {
         Verb::Plan(_) => print_plan(&plan),
         Verb::Status(_) => print_status(&plan, &directory),
+        Verb::Report(_) => {
+            let written = report::write(&plan, &read.suite, &directory, &directory.join("report"))?;
+            show_line!(
+                "{} of {} runs; {}",
+                written.finished,
+                written.planned,
+                written.html.display()
+            );
+        }
         Verb::Run { manner, .. } => return run(&plan, Shard::ALL, &directory, manner),
         Verb::Submit {
             engine: ClusterEngine::Slurm,

@@ -15,6 +15,7 @@
 //! ```
 
 pub mod plan;
+pub mod report;
 pub mod slurm;
 pub mod work;
 

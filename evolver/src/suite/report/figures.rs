@@ -1,0 +1,656 @@
+//! The paper's figures as SVG, each with its data as CSV.
+//!
+//! Lines and letters have the colour of the page's text, so that a figure can be read on a light
+//! and on a dark page.
+
+use super::gather::{Gathered, Group, Resilient, Run};
+use super::paper::PaperValues;
+use super::statistics::quantile;
+use minimal_surprise_sim::structures::{LineOrientation, Structure, classify};
+use minimal_surprise_sim::{Grid, Heading, Pose};
+use plotters::coord::Shift;
+use plotters::element::{Drawable, PointCollection};
+use plotters::prelude::{
+    ChartBuilder, Circle, Color, DrawingArea, IntoDrawingArea, IntoDynElement, PathElement,
+    Polygon, RGBColor, Rectangle, SVGBackend, Text,
+};
+use serde::Serialize;
+
+/// A figure.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// Name of its files.
+    pub id: String,
+    /// What it shows.
+    pub title: String,
+    /// The picture.
+    pub svg: String,
+    /// Its data.
+    pub csv: String,
+}
+
+/// What is drawn of an experiment in the paper.
+struct OfPaper {
+    figure: u32,
+    experiment: &'static str,
+    label: &'static str,
+    by: By,
+}
+
+/// What final states are shown one of each of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum By {
+    Structure,
+    Orientation,
+}
+
+const STATES_OF_PAPER: [OfPaper; 6] = [
+    states_of(7, "densities", "C, 15x15", By::Structure),
+    states_of(8, "densities", "C, 20x20", By::Structure),
+    states_of(
+        10,
+        "predefined",
+        "C, 15x15, line predefined",
+        By::Orientation,
+    ),
+    states_of(
+        10,
+        "predefined",
+        "C, 20x20, line predefined",
+        By::Orientation,
+    ),
+    states_of(11, "geometry", "C, 25x8, line predefined", By::Orientation),
+    states_of(12, "geometry", "C, 11x18, line predefined", By::Orientation),
+];
+
+const fn states_of(figure: u32, experiment: &'static str, label: &'static str, by: By) -> OfPaper {
+    OfPaper {
+        figure,
+        experiment,
+        label,
+        by,
+    }
+}
+
+/// A figure cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+#[error("figure {id}: {problem}")]
+pub struct FigureError {
+    id: String,
+    problem: String,
+}
+
+const MEMBER: RGBColor = RGBColor(31, 119, 180);
+const OTHER: RGBColor = RGBColor(140, 140, 140);
+const BOX: RGBColor = RGBColor(140, 140, 140);
+const MEDIAN: RGBColor = RGBColor(214, 39, 40);
+const FONT: &str = "sans-serif";
+
+/// All figures.
+///
+/// # Errors
+/// [`FigureError`] names the figure.
+pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, FigureError> {
+    let is_paper = !paper.distributions.is_empty();
+    let mut figures = Vec::new();
+    for experiment in gathered.experiments() {
+        if is_paper && experiment != "densities" {
+            continue;
+        }
+        let groups: Vec<&Group> = gathered
+            .groups
+            .iter()
+            .filter(|group| group.experiment == experiment && !group.runs.is_empty())
+            .collect();
+        if groups.is_empty() {
+            continue;
+        }
+        let name = |number: u32, what: &str| {
+            if is_paper {
+                (format!("figure-{number}"), format!("Fig. {number}: {what}"))
+            } else {
+                let what_id = what.split(' ').next().unwrap_or_default().to_lowercase();
+                (
+                    format!("{experiment}-{what_id}"),
+                    format!("{experiment}: {what}"),
+                )
+            }
+        };
+        figures.push(temperature(
+            name(
+                5,
+                "Temperature over time at even steps; box plots, medians red",
+            ),
+            &groups,
+        )?);
+        figures.push(best_fitness(
+            name(6, "Best fitness over generations; box plots, medians red"),
+            &groups,
+        )?);
+        figures.push(predictions(
+            name(9, "Predictions of the robot's surroundings, averaged over robots and steps, a run of each structure; the robot heads up"),
+            &groups,
+        )?);
+    }
+    if is_paper {
+        for of in &STATES_OF_PAPER {
+            let group = gathered.group(of.experiment, of.label);
+            if let Some(group) = group.filter(|group| !group.runs.is_empty()) {
+                let grid = &group.settings.written.grid;
+                figures.push(final_states(
+                    format!("figure-{}-{grid}", of.figure),
+                    format!(
+                        "Fig. {}: final states on {grid}, {}",
+                        of.figure, of.experiment
+                    ),
+                    group,
+                    of.by,
+                )?);
+            }
+        }
+    } else {
+        for (index, group) in gathered.groups.iter().enumerate() {
+            if !group.runs.is_empty() {
+                let id = format!("{}-states-{}", group.experiment, index + 1);
+                let title = format!("{}, {}: final states", group.experiment, group.label);
+                figures.push(final_states(id, title, group, By::Structure)?);
+            }
+        }
+    }
+    let numbers = ["Fig. 13: ", "Fig. 14: "];
+    for (index, resilient) in gathered.resiliences.iter().enumerate() {
+        let prefix = if is_paper {
+            numbers.get(index).copied().unwrap_or("")
+        } else {
+            ""
+        };
+        figures.extend(damage(prefix, resilient)?);
+    }
+    Ok(figures)
+}
+
+/// The run of each structure (or way of lines) with the largest share in it, ties by seed.
+fn one_of_each(group: &Group, by: By) -> Vec<(String, Structure, &Run)> {
+    let best = |structure: Structure, is: &dyn Fn(&&Run) -> bool| {
+        group.runs.iter().filter(is).reduce(|best, next| {
+            if next.share(structure) > best.share(structure) {
+                next
+            } else {
+                best
+            }
+        })
+    };
+    match by {
+        By::Structure => Structure::ALL
+            .into_iter()
+            .filter_map(|s| {
+                Some((
+                    s.name().to_owned(),
+                    s,
+                    best(s, &|run| run.name() == Some(s))?,
+                ))
+            })
+            .collect(),
+        By::Orientation => LineOrientation::ALL
+            .into_iter()
+            .filter_map(|o| {
+                let is = |run: &&Run| run.lines.orientation() == Some(o);
+                Some((
+                    o.name().to_owned(),
+                    Structure::Line,
+                    best(Structure::Line, &is)?,
+                ))
+            })
+            .collect(),
+    }
+}
+
+/// A swarm to be drawn.
+struct State<'a> {
+    title: String,
+    grid: Grid,
+    poses: &'a [Pose],
+    structure: Structure,
+    area: Option<super::damage_areas::Rectangle>,
+}
+
+fn final_states(id: String, title: String, group: &Group, by: By) -> Result<Figure, FigureError> {
+    let states: Vec<State<'_>> = one_of_each(group, by)
+        .into_iter()
+        .map(|(name, structure, run)| State {
+            title: format!("{name} (seed {})", run.finished.settings.seed),
+            grid: group.settings.scenario.grid(),
+            poses: &run.finished.final_poses,
+            structure,
+            area: None,
+        })
+        .collect();
+    let title = format!("{title}; robots in the structure are blue");
+    draw_states(id, title, &states, 3)
+}
+
+fn damage(prefix: &str, resilient: &Resilient) -> Result<Option<Figure>, FigureError> {
+    let Some(damaged) = &resilient.damaged else {
+        return Ok(None);
+    };
+    if damaged.areas.is_empty() {
+        return Ok(None);
+    }
+    let grid = damaged.run.finished.settings.scenario.grid();
+    let mut states = Vec::new();
+    for after in [false, true] {
+        for area in &damaged.areas {
+            let when = if after { "after the run" } else { "removed" };
+            states.push(State {
+                title: format!("area {}, {when}", area.name),
+                grid,
+                poses: if after { &area.after } else { &area.before },
+                structure: resilient.structure,
+                area: Some(area.rectangle),
+            });
+        }
+    }
+    let title = format!(
+        "{prefix}removal of robots from three areas of a {} on {grid}; robots in the structure are \
+         blue",
+        resilient.structure
+    );
+    let id = resilient.asked.name.clone();
+    draw_states(id, title, &states, damaged.areas.len()).map(Some)
+}
+
+const CELL: i32 = 12;
+const GAP: i32 = 22;
+
+#[derive(Serialize)]
+struct RobotRow<'a> {
+    state: &'a str,
+    robot: usize,
+    x: u16,
+    y: u16,
+    heading: u8,
+    in_structure: u8,
+}
+
+fn draw_states(
+    id: String,
+    title: String,
+    states: &[State<'_>],
+    columns: usize,
+) -> Result<Figure, FigureError> {
+    let mut rows = Vec::new();
+    let side = |cells: u16| i32::from(cells) * CELL;
+    let panel_width = states
+        .iter()
+        .map(|s| side(s.grid.width()))
+        .max()
+        .unwrap_or(0)
+        .max(180)
+        + GAP;
+    let panel_height = states
+        .iter()
+        .map(|s| side(s.grid.height()))
+        .max()
+        .unwrap_or(0)
+        + 2 * GAP;
+    let columns = columns.clamp(1, states.len().max(1));
+    let lines = states.len().div_ceil(columns).max(1);
+    let size = (
+        panel_width * columns as i32 + GAP,
+        panel_height * lines as i32,
+    );
+    let svg = draw(&id, size, |area| {
+        for (index, state) in states.iter().enumerate() {
+            let west = GAP / 2 + panel_width * (index % columns) as i32;
+            let top = panel_height * (index / columns) as i32 + GAP;
+            let found = classify(state.grid, state.poses).map_err(|error| error.to_string())?;
+            text(area, &state.title, (west, top - 18), 14)?;
+            let (width, height) = (side(state.grid.width()), side(state.grid.height()));
+            let frame = [(west, top), (west + width, top + height)];
+            put(area, Rectangle::new(frame, OTHER.stroke_width(1)))?;
+            for (robot, pose) in state.poses.iter().enumerate() {
+                let member = found.contains(state.structure, robot as u32);
+                let x = west + i32::from(pose.x) * CELL + CELL / 2;
+                let y = top + height - i32::from(pose.y) * CELL - CELL / 2;
+                let colour = if member { MEMBER } else { OTHER };
+                put(
+                    area,
+                    Polygon::new(
+                        triangle((x, y), pose.heading, CELL / 2 - 1),
+                        colour.filled(),
+                    ),
+                )?;
+                rows.push(RobotRow {
+                    state: &state.title,
+                    robot,
+                    x: pose.x,
+                    y: pose.y,
+                    heading: pose.heading.into(),
+                    in_structure: member.into(),
+                });
+            }
+            if let Some(cells) = state.area {
+                let corner =
+                    |x: u32, y: u32| (west + x as i32 * CELL, top + height - y as i32 * CELL);
+                let frame = [
+                    corner(cells.x0, cells.y1 + 1),
+                    corner(cells.x1 + 1, cells.y0),
+                ];
+                put(area, Rectangle::new(frame, MEDIAN.stroke_width(2)))?;
+            }
+        }
+        Ok(())
+    })?;
+    let csv = csv_of(&rows);
+    Ok(Figure {
+        id,
+        title,
+        svg,
+        csv,
+    })
+}
+
+/// A robot's triangle, its tip ahead.
+fn triangle(middle: (i32, i32), heading: Heading, half: i32) -> Vec<(i32, i32)> {
+    let (ahead_x, ahead_y) = heading.ahead();
+    // On the screen y grows down.
+    let at = |ahead: i32, left: i32| {
+        (
+            middle.0 + ahead * ahead_x - left * ahead_y,
+            middle.1 - ahead * ahead_y - left * ahead_x,
+        )
+    };
+    vec![at(half, 0), at(-half, half), at(-half, -half)]
+}
+
+#[derive(Serialize)]
+struct PredictionRow<'a> {
+    state: &'a str,
+    sensor: usize,
+    ahead: i8,
+    left: i8,
+    average_prediction: f64,
+}
+
+fn predictions((id, title): (String, String), groups: &[&Group]) -> Result<Figure, FigureError> {
+    const SIDE: i32 = 40;
+    const PANEL: i32 = 250;
+    let shown: Vec<(String, &Group, &Run)> = groups
+        .iter()
+        .flat_map(|group| {
+            one_of_each(group, By::Structure)
+                .into_iter()
+                .map(|(name, _, run)| {
+                    (
+                        format!("{}: {name}", group.settings.written.grid),
+                        *group,
+                        run,
+                    )
+                })
+        })
+        .collect();
+    let mut rows = Vec::new();
+    let columns = shown.len().clamp(1, 4) as i32;
+    let lines = (shown.len() as i32 + columns - 1) / columns;
+    let svg = draw(
+        &id,
+        (PANEL * columns, (PANEL + GAP) * lines.max(1)),
+        |area| {
+            for (index, (name, group, run)) in shown.iter().enumerate() {
+                let middle_x = PANEL * (index as i32 % columns) + PANEL / 2;
+                let middle_y = (PANEL + GAP) * (index as i32 / columns) + GAP + PANEL / 2;
+                text(
+                    area,
+                    name,
+                    (middle_x - 3 * SIDE + 20, middle_y - PANEL / 2 - 12),
+                    14,
+                )?;
+                let robot = triangle((middle_x, middle_y), Heading::North, SIDE / 3);
+                put(area, Polygon::new(robot, OTHER.filled()))?;
+                let cells = group.settings.topology.model().cells();
+                for (sensor, (cell, &average)) in
+                    cells.iter().zip(&run.average_prediction).enumerate()
+                {
+                    let x = middle_x - i32::from(cell.left) * SIDE;
+                    let y = middle_y - i32::from(cell.ahead) * SIDE;
+                    let half = SIDE / 2 - 1;
+                    let corners = [(x - half, y - half), (x + half, y + half)];
+                    put(
+                        area,
+                        Rectangle::new(corners, MEMBER.mix(0.7 * average).filled()),
+                    )?;
+                    put(area, Rectangle::new(corners, OTHER.stroke_width(1)))?;
+                    text(area, &format!("{average:.2}"), (x - 13, y - 7), 13)?;
+                    rows.push(PredictionRow {
+                        state: name,
+                        sensor,
+                        ahead: cell.ahead,
+                        left: cell.left,
+                        average_prediction: average,
+                    });
+                }
+            }
+            Ok(())
+        },
+    )?;
+    let csv = csv_of(&rows);
+    Ok(Figure {
+        id,
+        title,
+        svg,
+        csv,
+    })
+}
+
+/// Runs whose values are shown together over time.
+struct Panel {
+    title: String,
+    /// Of each run, its values.
+    runs: Vec<Vec<f64>>,
+    /// Every so manyth value is shown.
+    every: usize,
+}
+
+fn temperature((id, title): (String, String), groups: &[&Group]) -> Result<Figure, FigureError> {
+    let mut panels = Vec::new();
+    let panel = |title: String, group: &Group, is: &dyn Fn(&Run) -> bool| Panel {
+        title,
+        runs: group
+            .runs
+            .iter()
+            .filter(|run| is(run))
+            .map(|run| run.temperature.clone())
+            .collect(),
+        every: 2,
+    };
+    let dispersed = |run: &Run| run.name() == Some(Structure::RandomDispersion);
+    for group in groups {
+        panels.push(panel(group.label.clone(), group, &|_| true));
+    }
+    for group in groups {
+        let some = group.runs.iter().any(dispersed);
+        if some && !group.runs.iter().all(dispersed) {
+            let label = &group.label;
+            panels.push(panel(
+                format!("{label}, random dispersion"),
+                group,
+                &dispersed,
+            ));
+            panels.push(panel(format!("{label}, others"), group, &|run| {
+                !dispersed(run)
+            }));
+        }
+    }
+    box_plots(id, title, ("time step", "temperature"), &panels)
+}
+
+fn best_fitness((id, title): (String, String), groups: &[&Group]) -> Result<Figure, FigureError> {
+    let panels: Vec<Panel> = groups
+        .iter()
+        .map(|group| Panel {
+            title: group.label.clone(),
+            runs: group
+                .runs
+                .iter()
+                .map(|run| run.best_fitness.clone())
+                .collect(),
+            every: 1,
+        })
+        .collect();
+    box_plots(id, title, ("generation", "best fitness"), &panels)
+}
+
+#[derive(Serialize)]
+struct BoxRow<'a> {
+    panel: &'a str,
+    at: usize,
+    runs: usize,
+    minimum: f64,
+    lower_quartile: f64,
+    median: f64,
+    upper_quartile: f64,
+    maximum: f64,
+}
+
+fn box_plots(
+    id: String,
+    title: String,
+    (x_name, y_name): (&str, &str),
+    panels: &[Panel],
+) -> Result<Figure, FigureError> {
+    const WIDTH: i32 = 460;
+    const HEIGHT: i32 = 260;
+    let columns = panels.len().clamp(1, 2);
+    let lines = panels.len().div_ceil(columns).max(1);
+    let values = panels
+        .iter()
+        .flat_map(|panel| panel.runs.iter().flatten().copied());
+    let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
+    let (low, high) = if low < high {
+        (low, high)
+    } else {
+        (low - 0.5, low + 0.5)
+    };
+    let mut rows = Vec::new();
+    let size = (WIDTH * columns as i32, HEIGHT * lines as i32);
+    let svg = draw(&id, size, |root| {
+        for (area, panel) in root.split_evenly((lines, columns)).iter().zip(panels) {
+            let length = panel.runs.iter().map(Vec::len).max().unwrap_or(0);
+            let mut chart = ChartBuilder::on(area)
+                .caption(&panel.title, (FONT, 15))
+                .margin(6)
+                .margin_right(14)
+                .x_label_area_size(34)
+                .y_label_area_size(46)
+                .build_cartesian_2d(-1.0..length as f64 + 1.0, low..high)
+                .map_err(|error| error.to_string())?;
+            chart
+                .configure_mesh()
+                .disable_mesh()
+                .x_labels(6)
+                .y_labels(6)
+                .x_desc(x_name)
+                .y_desc(y_name)
+                .x_label_formatter(&|x| format!("{x:.0}"))
+                .y_label_formatter(&|y| format!("{y:.2}"))
+                .label_style((FONT, 12))
+                .axis_desc_style((FONT, 13))
+                .draw()
+                .map_err(|error| error.to_string())?;
+            let half = 0.4 * panel.every as f64;
+            for at in (0..length).step_by(panel.every) {
+                let mut values: Vec<f64> = panel
+                    .runs
+                    .iter()
+                    .filter_map(|run| run.get(at).copied())
+                    .collect();
+                values.sort_by(f64::total_cmp);
+                let [lower, middle, upper] = [0.25, 0.5, 0.75].map(|q| quantile(&values, q));
+                let reach = 1.5 * (upper - lower);
+                let inside = |value: &&f64| (lower - reach..=upper + reach).contains(*value);
+                let least = values.iter().find(inside).copied().unwrap_or(lower);
+                let most = values.iter().rfind(inside).copied().unwrap_or(upper);
+                let x = at as f64;
+                let mut shapes = vec![
+                    PathElement::new(vec![(x, least), (x, lower)], BOX.stroke_width(1)).into_dyn(),
+                    PathElement::new(vec![(x, upper), (x, most)], BOX.stroke_width(1)).into_dyn(),
+                    Rectangle::new(
+                        [(x - half, lower), (x + half, upper)],
+                        BOX.mix(0.6).filled(),
+                    )
+                    .into_dyn(),
+                    PathElement::new(
+                        vec![(x - half, middle), (x + half, middle)],
+                        MEDIAN.stroke_width(2),
+                    )
+                    .into_dyn(),
+                ];
+                let outliers = values.iter().filter(|value| !inside(value));
+                shapes.extend(
+                    outliers.map(|&value| Circle::new((x, value), 1, BOX.filled()).into_dyn()),
+                );
+                chart
+                    .draw_series(shapes)
+                    .map_err(|error| error.to_string())?;
+                rows.push(BoxRow {
+                    panel: &panel.title,
+                    at,
+                    runs: values.len(),
+                    minimum: quantile(&values, 0.0),
+                    lower_quartile: lower,
+                    median: middle,
+                    upper_quartile: upper,
+                    maximum: quantile(&values, 1.0),
+                });
+            }
+        }
+        Ok(())
+    })?;
+    let csv = csv_of(&rows);
+    Ok(Figure {
+        id,
+        title,
+        svg,
+        csv,
+    })
+}
+
+type Paper<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// An SVG whose black is the colour of the text around it.
+fn draw(
+    id: &str,
+    size: (i32, i32),
+    onto: impl FnOnce(&Paper<'_>) -> Result<(), String>,
+) -> Result<String, FigureError> {
+    let mut svg = String::new();
+    let size = (size.0.max(1) as u32, size.1.max(1) as u32);
+    let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+    let drawn = onto(&area).and_then(|()| area.present().map_err(|error| error.to_string()));
+    drop(area);
+    match drawn {
+        Ok(()) => Ok(svg.replace("#000000", "currentColor")),
+        Err(problem) => Err(FigureError {
+            id: id.to_owned(),
+            problem,
+        }),
+    }
+}
+
+fn put<'a, E>(area: &Paper<'a>, element: E) -> Result<(), String>
+where
+    for<'b> &'b E: PointCollection<'b, (i32, i32)>,
+    E: Drawable<SVGBackend<'a>>,
+{
+    area.draw(&element).map_err(|error| error.to_string())
+}
+
+fn text(area: &Paper<'_>, words: &str, at: (i32, i32), size: i32) -> Result<(), String> {
+    put(area, Text::new(words.to_owned(), at, (FONT, size)))
+}
+
+fn csv_of(rows: &[impl Serialize]) -> String {
+    super::csv_text(rows)
+}

@@ -1,0 +1,458 @@
+//! The paper's main findings, and whether they hold in our runs.
+
+use super::gather::{Gathered, Group, Resilient, Run, regained};
+use super::paper::{PaperValues, is_grouping};
+use super::statistics::{Test, fisher, mann_whitney, median_interval, sign};
+use super::tables::MEDIAN_BEST_FITNESS;
+use crate::reevaluation::{mean, median};
+use minimal_surprise_sim::structures::{LineOrientation, Structure};
+use serde::Serialize;
+use std::collections::BTreeSet;
+
+/// How far a median best fitness may be from the paper's.
+const FITNESS_TOLERANCE: f64 = 0.03;
+/// Numbers printed with two digits may be this much further apart and still be as far apart as the
+/// tolerance says.
+const PRINTED: f64 = 1e-9;
+
+/// Whether a finding is seen in our runs too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// It is.
+    Holds,
+    /// It is not.
+    Differs,
+    /// The runs that there are cannot tell.
+    #[serde(rename = "not enough runs")]
+    NotEnoughRuns,
+}
+
+impl Verdict {
+    /// In words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Holds => "holds",
+            Self::Differs => "differs",
+            Self::NotEnoughRuns => "not enough runs",
+        }
+    }
+}
+
+/// A finding of the paper, and ours.
+#[derive(Clone, Debug, Serialize)]
+pub struct Finding {
+    /// What the paper found.
+    pub claim: String,
+    /// What we found.
+    pub ours: String,
+    /// The test, or how it was told.
+    pub test: String,
+    /// Its p-value, if it has one.
+    pub p: Option<f64>,
+    /// Whether it holds.
+    pub verdict: Verdict,
+}
+
+/// The groups that a finding is about; none of them if one is not in the plan.
+fn groups<'a, const N: usize>(
+    gathered: &'a Gathered,
+    wanted: [(&str, &str); N],
+) -> Option<[&'a Group; N]> {
+    let found: Option<Vec<&Group>> = wanted
+        .into_iter()
+        .map(|(experiment, label)| gathered.group(experiment, label))
+        .collect();
+    found?.try_into().ok()
+}
+
+/// A statement that one run can break.
+fn universal(groups: &[&Group], is_true: bool) -> Verdict {
+    if !is_true && groups.iter().all(|group| !group.runs.is_empty()) {
+        Verdict::Differs
+    } else if is_true && groups.iter().all(|group| group.is_complete()) {
+        Verdict::Holds
+    } else {
+        Verdict::NotEnoughRuns
+    }
+}
+
+/// A statement about a tendency: true, untrue and the test tells, or untrue by what may be chance.
+fn tendency(groups: &[&Group], is_true: bool, test: Test) -> Verdict {
+    let complete = groups.iter().all(|group| group.is_complete());
+    if groups.iter().any(|group| group.runs.is_empty()) {
+        Verdict::NotEnoughRuns
+    } else if is_true && (complete || !test.compatible()) {
+        Verdict::Holds
+    } else if !is_true && !test.compatible() {
+        Verdict::Differs
+    } else {
+        Verdict::NotEnoughRuns
+    }
+}
+
+fn count(group: &Group, is: impl Fn(&Run) -> bool) -> u32 {
+    group.runs.iter().filter(|run| is(run)).count() as u32
+}
+
+fn is_named(run: &Run, structures: &[Structure]) -> bool {
+    run.name().is_some_and(|name| structures.contains(&name))
+}
+
+/// "12 of 20 runs"; what is missing is said too.
+fn of_runs(number: u32, group: &Group) -> String {
+    format!("{number} of {}", group.counted())
+}
+
+/// Every finding that the plan has the experiments for.
+#[must_use]
+pub fn all(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
+    if paper.distributions.is_empty() {
+        return Vec::new();
+    }
+    let mut findings = Vec::new();
+    findings.extend(model_b(gathered));
+    findings.extend(many_structures(gathered));
+    findings.extend(densities(gathered));
+    findings.extend(predefined(gathered));
+    findings.extend(partly_predefined(gathered, paper));
+    findings.extend(horizontal(gathered));
+    for resilient in &gathered.resiliences {
+        findings.extend(resilience(resilient));
+    }
+    findings.extend(noise(gathered));
+    findings.extend(fitness(gathered, paper));
+    findings
+}
+
+fn model_b(gathered: &Gathered) -> Option<Finding> {
+    let [group] = groups(gathered, [("sensor-models", "B, 20x20")])?;
+    let named = count(group, |run| {
+        is_named(run, &[Structure::Line, Structure::Pair])
+    });
+    let others = group.runs.len() as u32 - named;
+    let test = fisher(&[named, others], &[group.planned as u32, 0]);
+    Some(Finding {
+        claim: "Sensor model B on 20 × 20 gives lines and pairs only".into(),
+        ours: format!("lines or pairs in {}", of_runs(named, group)),
+        test: format!("every run; against the paper {}", test.name),
+        p: Some(test.p),
+        verdict: universal(&[group], others == 0),
+    })
+}
+
+fn many_structures(gathered: &Gathered) -> Vec<Finding> {
+    let of_grid = |grid: &str| {
+        let [group] = groups(gathered, [("sensor-models", format!("C, {grid}").as_str())])?;
+        let names: BTreeSet<&str> = group
+            .runs
+            .iter()
+            .filter_map(|run| run.name().map(Structure::name))
+            .collect();
+        let enough = names.len() >= 4;
+        Some(Finding {
+            claim: format!("Sensor model C gives four or more structures on {grid}"),
+            ours: format!(
+                "{} in {}: {}",
+                names.len(),
+                group.counted(),
+                names.into_iter().collect::<Vec<_>>().join(", ")
+            ),
+            test: "number of structures that runs are named after".into(),
+            p: None,
+            verdict: match (enough, group.is_complete()) {
+                (true, _) => Verdict::Holds,
+                (false, true) => Verdict::Differs,
+                (false, false) => Verdict::NotEnoughRuns,
+            },
+        })
+    };
+    ["15x15", "20x20"].into_iter().filter_map(of_grid).collect()
+}
+
+/// More than half of the runs are named so.
+fn most(group: &Group, claim: &str, what: &str, is: impl Fn(&Run) -> bool) -> Finding {
+    let named = count(group, is);
+    let others = group.runs.len() as u32 - named;
+    let test = sign(named, others);
+    Finding {
+        claim: claim.into(),
+        ours: format!("{what} in {}", of_runs(named, group)),
+        test: format!("{} against one half", test.name),
+        p: Some(test.p),
+        verdict: tendency(&[group], named > others, test),
+    }
+}
+
+fn densities(gathered: &Gathered) -> Vec<Finding> {
+    let Some([dense, sparse]) = groups(
+        gathered,
+        [("densities", "C, 15x15"), ("densities", "C, 20x20")],
+    ) else {
+        return Vec::new();
+    };
+    let loose = [
+        Structure::Line,
+        Structure::Pair,
+        Structure::RandomDispersion,
+    ];
+    vec![
+        most(dense, "Grouping dominates on 15 × 15", "grouping", |run| {
+            run.name().is_some_and(is_grouping)
+        }),
+        most(
+            sparse,
+            "Dispersion, lines and pairs dominate on 20 × 20",
+            "dispersion, lines or pairs",
+            |run| is_named(run, &loose),
+        ),
+    ]
+}
+
+fn predefined(gathered: &Gathered) -> Vec<Finding> {
+    let wanted = [
+        ("predefined", "C, 15x15, line predefined"),
+        ("predefined", "C, 20x20, line predefined"),
+    ];
+    let Some([dense, sparse]) = groups(gathered, wanted) else {
+        return Vec::new();
+    };
+    let every = |group: &&Group| {
+        let lines = count(group, |run| is_named(run, &[Structure::Line]));
+        let others = group.runs.len() as u32 - lines;
+        let test = fisher(&[lines, others], &[group.planned as u32, 0]);
+        Finding {
+            claim: format!(
+                "Predefined lines give lines in every run on {}",
+                group.settings.written.grid
+            ),
+            ours: format!("lines in {}", of_runs(lines, group)),
+            test: format!("every run; against the paper {}", test.name),
+            p: Some(test.p),
+            verdict: universal(&[group], others == 0),
+        }
+    };
+    let mut findings: Vec<Finding> = [dense, sparse].iter().map(every).collect();
+    let shares = [dense, sparse].map(|group| group.values(|run| run.share(Structure::Line)));
+    let test = mann_whitney(&shares[1], &shares[0]);
+    findings.push(Finding {
+        claim: "Predefined lines hold a larger share of the robots on 20 × 20 than on 15 × 15"
+            .into(),
+        ours: format!(
+            "medians {:.1} % ({}) and {:.1} % ({})",
+            100.0 * median(&shares[1]),
+            sparse.counted(),
+            100.0 * median(&shares[0]),
+            dense.counted()
+        ),
+        test: test.name.into(),
+        p: Some(test.p),
+        verdict: tendency(
+            &[dense, sparse],
+            median(&shares[1]) > median(&shares[0]),
+            test,
+        ),
+    });
+    findings
+}
+
+fn partly_predefined(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
+    let of_grid = |raised: &super::paper::Raised| {
+        let grid = &raised.grid;
+        let [free, partly] = groups(
+            gathered,
+            [
+                ("densities", format!("C, {grid}").as_str()),
+                (
+                    "partly-predefined",
+                    format!("C, {grid}, line partly predefined").as_str(),
+                ),
+            ],
+        )?;
+        let lines = [free, partly].map(|g| count(g, |run| is_named(run, &[Structure::Line])));
+        let runs = [free, partly].map(|group| group.runs.len() as u32);
+        let percent =
+            |index: usize| 100.0 * f64::from(lines[index]) / f64::from(runs[index].max(1));
+        let test = fisher(
+            &[lines[0], runs[0] - lines[0]],
+            &[lines[1], runs[1] - lines[1]],
+        );
+        Some(Finding {
+            claim: format!(
+                "Partly predefining raises the share of line runs on {grid} (paper: by {} points)",
+                raised.points
+            ),
+            ours: format!(
+                "by {:.0} points, from {:.0} % ({}) to {:.0} % ({})",
+                percent(1) - percent(0),
+                percent(0),
+                free.counted(),
+                percent(1),
+                partly.counted()
+            ),
+            test: test.name.into(),
+            p: Some(test.p),
+            verdict: tendency(&[free, partly], percent(1) > percent(0), test),
+        })
+    };
+    paper.raised.iter().filter_map(of_grid).collect()
+}
+
+fn horizontal(gathered: &Gathered) -> Option<Finding> {
+    let [group] = groups(gathered, [("geometry", "C, 11x18, line predefined")])?;
+    let [horizontal, vertical] = [
+        LineOrientation::MostlyHorizontal,
+        LineOrientation::MostlyVertical,
+    ]
+    .map(|orientation| count(group, |run| run.lines.orientation() == Some(orientation)));
+    let test = sign(horizontal, vertical);
+    Some(Finding {
+        claim: "11 × 18 favours horizontal over vertical lines".into(),
+        ours: format!(
+            "mostly horizontal in {horizontal}, mostly vertical in {vertical} of {}",
+            group.counted()
+        ),
+        test: test.name.into(),
+        p: Some(test.p),
+        verdict: tendency(&[group], horizontal > vertical, test),
+    })
+}
+
+fn resilience(resilient: &Resilient) -> Vec<Finding> {
+    let of_kind = |kind: &str| {
+        let claim = format!(
+            "After {kind} the share in the structure at the end is at least that at the start \
+             ({})",
+            resilient.structure
+        );
+        let Some(damaged) = &resilient.damaged else {
+            return Finding {
+                claim,
+                ours: format!(
+                    "none of {} runs is named after the structure",
+                    resilient.looked_through
+                ),
+                test: "mean shares".into(),
+                p: None,
+                verdict: Verdict::NotEnoughRuns,
+            };
+        };
+        let rows: Vec<_> = damaged
+            .areas
+            .iter()
+            .map(|area| {
+                let removed = kind == "removal";
+                let row = if removed {
+                    &area.removed
+                } else {
+                    &area.repositioned
+                };
+                (area.name, row)
+            })
+            .collect();
+        let pairs = rows
+            .iter()
+            .flat_map(|(_, row)| row.share_end.iter().zip(&row.share_start));
+        let (mut gained, mut lost) = (0, 0);
+        for (end, start) in pairs {
+            gained += u32::from(end > start);
+            lost += u32::from(end < start);
+        }
+        let test = sign(gained, lost);
+        let words = rows.iter().map(|(name, row)| {
+            format!(
+                "{name} {:.1} → {:.1} %",
+                100.0 * mean(&row.share_start),
+                100.0 * mean(&row.share_end)
+            )
+        });
+        Finding {
+            claim,
+            ours: words.collect::<Vec<_>>().join(", "),
+            test: format!("mean shares of each area; {} of the runs", test.name),
+            p: Some(test.p),
+            verdict: if rows.len() < resilient.asked.robots_in_areas.len() {
+                Verdict::NotEnoughRuns
+            } else if rows.iter().all(|(_, row)| regained(row) >= 0.0) {
+                Verdict::Holds
+            } else {
+                Verdict::Differs
+            },
+        }
+    };
+    vec![of_kind("removal"), of_kind("repositioning")]
+}
+
+fn noise(gathered: &Gathered) -> Vec<Finding> {
+    let Some([dense, sparse]) = groups(
+        gathered,
+        [
+            ("noise", "C, 15x15, 15 % noise"),
+            ("noise", "C, 20x20, 15 % noise"),
+        ],
+    ) else {
+        return Vec::new();
+    };
+    let dispersed = count(sparse, |run| is_named(run, &[Structure::RandomDispersion]));
+    let others = sparse.runs.len() as u32 - dispersed;
+    let test = fisher(&[dispersed, others], &[sparse.planned as u32, 0]);
+    vec![
+        Finding {
+            claim: "With 15 % noise 20 × 20 gives dispersion only".into(),
+            ours: format!("random dispersion in {}", of_runs(dispersed, sparse)),
+            test: format!("every run; against the paper {}", test.name),
+            p: Some(test.p),
+            verdict: universal(&[sparse], others == 0),
+        },
+        most(
+            dense,
+            "With 15 % noise 15 × 15 gives mostly grouping",
+            "grouping",
+            |run| run.name().is_some_and(is_grouping),
+        ),
+    ]
+}
+
+/// A line for every setting that the paper gives a median best fitness for.
+fn fitness(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
+    let of_group = |group: &Group| {
+        let number = paper.number(&group.experiment, &group.label, MEDIAN_BEST_FITNESS)?;
+        let values = group.values(Run::fitness);
+        let ours = median(&values);
+        let interval = median_interval(&values);
+        let near = (ours - number.value).abs() <= FITNESS_TOLERANCE + PRINTED;
+        // Whether all of the interval is nearer, or all farther.
+        let sure = interval.is_some_and(|interval| {
+            let ends = [interval.low, interval.high];
+            let nearer = ends.map(|end| (end - number.value).abs() <= FITNESS_TOLERANCE);
+            nearer[0] == nearer[1]
+        });
+        Some(Finding {
+            claim: format!(
+                "Median best fitness within {FITNESS_TOLERANCE} of the paper's {} ({}: {}, {})",
+                number.value, group.experiment, group.label, number.source
+            ),
+            ours: interval.map_or_else(
+                || group.counted(),
+                |i| {
+                    format!(
+                        "{ours:.3} ({:.3} to {:.3}), {}",
+                        i.low,
+                        i.high,
+                        group.counted()
+                    )
+                },
+            ),
+            test: "distance; bootstrap 95 % interval".into(),
+            p: None,
+            verdict: match (near, group.is_complete() || sure) {
+                _ if values.is_empty() => Verdict::NotEnoughRuns,
+                (true, true) => Verdict::Holds,
+                (false, true) => Verdict::Differs,
+                (_, false) => Verdict::NotEnoughRuns,
+            },
+        })
+    };
+    gathered.groups.iter().filter_map(of_group).collect()
+}

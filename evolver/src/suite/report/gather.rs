@@ -1,0 +1,497 @@
+//! What a report is about: the finished runs of a plan, and what is made of them afterwards.
+
+use super::ReportError;
+use super::damage_areas::{Rectangle, smallest_apart};
+use crate::files;
+use crate::finished_run::{FinishedRun, ReadRunError};
+use crate::reevaluation::{ResilienceRow, mean, rerun, resilience};
+use crate::settings::Settings;
+use crate::suite::plan::{Plan, PlannedRun, PlannedSettings};
+use crate::suite::{Reevaluation, Resilience, Suite};
+use minimal_surprise_controller::Controller;
+use minimal_surprise_sim::evaluation::run;
+use minimal_surprise_sim::structures::{LineCounts, LineOrientation, Structure, classify};
+use minimal_surprise_sim::{Area, Damage, Pose, SeedTree};
+use serde::Deserialize;
+use std::path::Path;
+
+/// A finished run and what is known of it.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Its name.
+    pub id: String,
+    /// Genome, start, end, hash.
+    pub finished: FinishedRun,
+    /// The structures it is named after, in the paper's order; several if tied, none if no robot
+    /// is in any.
+    pub names: Vec<Structure>,
+    /// Share of robots in each structure at the end, as [`Structure::ALL`].
+    pub shares: [f64; 8],
+    /// Its lines.
+    pub lines: LineCounts,
+    /// Best fitness of every generation.
+    pub best_fitness: Vec<f64>,
+    /// Movement M.
+    pub movement: f64,
+    /// Intended movement I.
+    pub intended_movement: f64,
+    /// Temperature of every step.
+    pub temperature: Vec<f64>,
+    /// Average prediction of every sensor.
+    pub average_prediction: Vec<f64>,
+    /// Program, version and revision that did it.
+    pub program: String,
+}
+
+impl Run {
+    /// Fitness of the last generation's best genome.
+    #[must_use]
+    pub fn fitness(&self) -> f64 {
+        self.best_fitness.last().copied().unwrap_or(0.0)
+    }
+
+    /// The structure that it counts for in tests: of tied ones the first in the paper's order.
+    #[must_use]
+    pub fn name(&self) -> Option<Structure> {
+        self.names.first().copied()
+    }
+
+    /// Share of robots in a structure at the end.
+    #[must_use]
+    pub fn share(&self, structure: Structure) -> f64 {
+        let place = Structure::ALL.iter().position(|&s| s == structure);
+        place.map_or(0.0, |place| self.shares[place])
+    }
+
+    /// Share of robots in the structure that it is named after.
+    #[must_use]
+    pub fn named_share(&self) -> f64 {
+        self.name().map_or(0.0, |name| self.share(name))
+    }
+}
+
+/// The finished runs under the same settings.
+#[derive(Clone, Debug)]
+pub struct Group {
+    /// The experiment.
+    pub experiment: String,
+    /// What distinguishes the settings.
+    pub label: String,
+    /// The settings, with the first seed.
+    pub settings: Settings,
+    /// Runs that are planned.
+    pub planned: usize,
+    /// Those that are finished, by seed.
+    pub runs: Vec<Run>,
+}
+
+impl Group {
+    /// Whether every planned run is finished.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.runs.len() == self.planned
+    }
+
+    /// How many of its runs are finished, in words.
+    #[must_use]
+    pub fn counted(&self) -> String {
+        if self.is_complete() {
+            format!("{} runs", self.planned)
+        } else {
+            format!("{} of {} runs", self.runs.len(), self.planned)
+        }
+    }
+
+    /// One number of every run.
+    pub fn values(&self, of: impl Fn(&Run) -> f64) -> Vec<f64> {
+        self.runs.iter().map(of).collect()
+    }
+}
+
+/// Which way the lines of a run go, from each new start, and the structures they are named after.
+#[derive(Clone, Debug)]
+pub struct NewStart {
+    /// None without lines.
+    pub orientation: Option<LineOrientation>,
+    /// Structures.
+    pub names: Vec<Structure>,
+}
+
+/// The best genomes of a group from new starts.
+#[derive(Clone, Debug)]
+pub struct Reevaluated {
+    /// Name of the re-evaluation.
+    pub name: String,
+    /// New starts of each genome.
+    pub starts: u32,
+    /// The experiment.
+    pub experiment: String,
+    /// What distinguishes the settings.
+    pub label: String,
+    /// Of every genome, its new starts.
+    pub genomes: Vec<Vec<NewStart>>,
+}
+
+impl Reevaluated {
+    /// What each genome forms in more than half of its starts.
+    #[must_use]
+    pub fn orientations(&self) -> Vec<Option<LineOrientation>> {
+        let of_genome = |starts: &Vec<NewStart>| {
+            let orientations: Vec<_> = starts.iter().map(|start| start.orientation).collect();
+            LineOrientation::of_most(&orientations)
+        };
+        self.genomes.iter().map(of_genome).collect()
+    }
+}
+
+/// An area that was damaged.
+#[derive(Clone, Debug)]
+pub struct DamagedArea {
+    /// A, B, C, …
+    pub name: char,
+    /// The cells.
+    pub rectangle: Rectangle,
+    /// After the removal, before it goes on.
+    pub before: Vec<Pose>,
+    /// After it went on.
+    pub after: Vec<Pose>,
+    /// What became of it when robots were removed.
+    pub removed: ResilienceRow,
+    /// What became of it when they were put elsewhere.
+    pub repositioned: ResilienceRow,
+}
+
+/// A structure that was damaged.
+#[derive(Clone, Debug)]
+pub struct Damaged {
+    /// The setting it evolved under.
+    pub label: String,
+    /// The run.
+    pub run: Run,
+    /// As it evolved.
+    pub initial: ResilienceRow,
+    /// From new starts.
+    pub new_starts: ResilienceRow,
+    /// The areas that there are.
+    pub areas: Vec<DamagedArea>,
+}
+
+impl Damaged {
+    /// Every row with its name.
+    #[must_use]
+    pub fn rows(&self) -> Vec<(String, &ResilienceRow)> {
+        let mut rows = vec![
+            ("initial run".to_owned(), &self.initial),
+            ("new starts".to_owned(), &self.new_starts),
+        ];
+        rows.extend(
+            self.areas
+                .iter()
+                .map(|area| (format!("remove area {}", area.name), &area.removed)),
+        );
+        rows.extend(
+            self.areas
+                .iter()
+                .map(|area| (format!("reposition area {}", area.name), &area.repositioned)),
+        );
+        rows
+    }
+}
+
+/// A resilience experiment.
+#[derive(Clone, Debug)]
+pub struct Resilient {
+    /// What was asked for.
+    pub asked: Resilience,
+    /// The structure.
+    pub structure: Structure,
+    /// Finished runs looked through.
+    pub looked_through: usize,
+    /// Those named after the structure.
+    pub named: usize,
+    /// None if there is no run of the structure.
+    pub damaged: Option<Damaged>,
+}
+
+/// Everything that a report is about.
+#[derive(Clone, Debug)]
+pub struct Gathered {
+    /// The evolutions.
+    pub groups: Vec<Group>,
+    /// The re-evaluations.
+    pub reevaluations: Vec<Reevaluated>,
+    /// The resilience experiments.
+    pub resiliences: Vec<Resilient>,
+}
+
+impl Gathered {
+    /// Reads the finished runs of a plan and makes of them what the suite asks for.
+    ///
+    /// # Errors
+    /// [`ReportError`] if a finished run cannot be read.
+    pub fn read(plan: &Plan, suite: &Suite, directory: &Path) -> Result<Self, ReportError> {
+        let mut groups = Vec::new();
+        for experiment in &plan.experiments {
+            for settings in &experiment.settings {
+                groups.extend(read_group(&experiment.name, settings, directory)?);
+            }
+        }
+        let mut reevaluations = Vec::new();
+        for asked in &suite.reevaluations {
+            let wanted = |group: &&Group| asked.of.contains(&group.experiment);
+            for group in groups.iter().filter(wanted) {
+                reevaluations.push(reevaluate(asked, group)?);
+            }
+        }
+        let mut resiliences = Vec::new();
+        for asked in &suite.resiliences {
+            if plan.experiments.iter().any(|e| e.name == asked.of) {
+                resiliences.push(damage(asked, &groups)?);
+            }
+        }
+        Ok(Self {
+            groups,
+            reevaluations,
+            resiliences,
+        })
+    }
+
+    /// The runs of an experiment under some settings, if they are in the plan.
+    #[must_use]
+    pub fn group(&self, experiment: &str, label: &str) -> Option<&Group> {
+        self.groups
+            .iter()
+            .find(|group| group.experiment == experiment && group.label == label)
+    }
+
+    /// Names of the experiments, in order.
+    #[must_use]
+    pub fn experiments(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = self.groups.iter().map(|g| g.experiment.as_str()).collect();
+        names.dedup();
+        names
+    }
+}
+
+#[derive(Deserialize)]
+struct FinalFile {
+    average_prediction: Vec<f64>,
+    measures: MeasuresFile,
+}
+
+#[derive(Deserialize)]
+struct MeasuresFile {
+    movement: f64,
+    intended_movement: f64,
+    temperature: Vec<f64>,
+}
+
+#[derive(Deserialize)]
+struct MetaFile {
+    program: String,
+    program_version: String,
+    revision: String,
+}
+
+#[derive(Deserialize)]
+struct GenerationLine {
+    best_fitness: f64,
+}
+
+fn read_group(
+    experiment: &str,
+    settings: &PlannedSettings,
+    directory: &Path,
+) -> Result<Option<Group>, ReportError> {
+    let Some(first) = settings.runs.first() else {
+        return Ok(None);
+    };
+    let mut runs = Vec::new();
+    for planned in &settings.runs {
+        runs.extend(read_run(planned, &planned.directory(directory))?);
+    }
+    Ok(Some(Group {
+        experiment: experiment.to_owned(),
+        label: settings.label.clone(),
+        settings: first.settings.clone(),
+        planned: settings.runs.len(),
+        runs,
+    }))
+}
+
+/// A run; none if it is not finished.
+fn read_run(planned: &PlannedRun, directory: &Path) -> Result<Option<Run>, ReportError> {
+    let finished = match FinishedRun::read(directory) {
+        Ok(finished) => finished,
+        Err(ReadRunError::NotComplete { .. }) => return Ok(None),
+        Err(error) => return Err(error.into()),
+    };
+    let state: FinalFile = json(&directory.join("final.json"))?;
+    let meta: MetaFile = json(&directory.join("meta.json"))?;
+    let path = directory.join("generations.csv");
+    let best_fitness = csv::Reader::from_reader(files::read(&path)?.as_slice())
+        .deserialize()
+        .map(|line| line.map(|line: GenerationLine| line.best_fitness))
+        .collect::<Result<_, _>>()
+        .map_err(|error| ReportError::Csv { path, error })?;
+    let found = classify(finished.settings.scenario.grid(), &finished.final_poses)?;
+    Ok(Some(Run {
+        id: planned.id.clone(),
+        names: found.names(),
+        shares: Structure::ALL.map(|structure| found.share(structure)),
+        lines: found.line_counts(),
+        best_fitness,
+        movement: state.measures.movement,
+        intended_movement: state.measures.intended_movement,
+        temperature: state.measures.temperature,
+        average_prediction: state.average_prediction,
+        program: format!(
+            "{} {}, revision {}",
+            meta.program, meta.program_version, meta.revision
+        ),
+        finished,
+    }))
+}
+
+fn json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, ReportError> {
+    serde_json::from_slice(&files::read(path)?).map_err(|error| ReportError::Json {
+        path: path.to_owned(),
+        error,
+    })
+}
+
+fn reevaluate(asked: &Reevaluation, group: &Group) -> Result<Reevaluated, ReportError> {
+    let mut genomes = Vec::new();
+    for run in &group.runs {
+        let settings = &run.finished.settings;
+        let seeds = SeedTree::new(settings.seed);
+        let reruns = rerun(
+            &run.finished.genome,
+            &settings.scenario,
+            seeds,
+            asked.starts,
+        )?;
+        let starts = reruns.into_iter().map(|rerun| NewStart {
+            orientation: rerun.orientation,
+            names: rerun.names,
+        });
+        genomes.push(starts.collect());
+    }
+    Ok(Reevaluated {
+        name: asked.name.clone(),
+        starts: asked.starts,
+        experiment: group.experiment.clone(),
+        label: group.label.clone(),
+        genomes,
+    })
+}
+
+/// A structure by its name in files.
+pub(super) fn structure_named(name: &str) -> Option<Structure> {
+    let spaced = name.replace('-', " ");
+    Structure::ALL.into_iter().find(|s| s.name() == spaced)
+}
+
+fn damage(asked: &Resilience, groups: &[Group]) -> Result<Resilient, ReportError> {
+    let structure =
+        structure_named(&asked.structure).ok_or_else(|| ReportError::UnknownStructure {
+            name: asked.structure.clone(),
+        })?;
+    let all: Vec<(&Group, &Run)> = groups
+        .iter()
+        .filter(|group| group.experiment == asked.of)
+        .flat_map(|group| group.runs.iter().map(move |run| (group, run)))
+        .collect();
+    let named: Vec<(&Group, &Run)> = all
+        .iter()
+        .copied()
+        .filter(|(_, run)| run.names.contains(&structure))
+        .collect();
+    // The first of the best: by share, then by seed, then in the plan's order.
+    let chosen = named.iter().copied().reduce(|best, next| {
+        let key = |run: &Run| (run.share(structure), run.finished.settings.seed);
+        let ((best_share, best_seed), (share, seed)) = (key(best.1), key(next.1));
+        if share > best_share || (share == best_share && seed < best_seed) {
+            next
+        } else {
+            best
+        }
+    });
+    let damaged = chosen
+        .map(|(group, run)| damage_run(asked, structure, group, run))
+        .transpose()?;
+    Ok(Resilient {
+        asked: asked.clone(),
+        structure,
+        looked_through: all.len(),
+        named: named.len(),
+        damaged,
+    })
+}
+
+fn damage_run(
+    asked: &Resilience,
+    structure: Structure,
+    group: &Group,
+    of: &Run,
+) -> Result<Damaged, ReportError> {
+    let finished = &of.finished;
+    let conditions = &finished.settings.scenario;
+    let grid = conditions.grid();
+    let seeds = SeedTree::new(finished.settings.seed);
+    let rows = |damage, repeat| resilience(finished, structure, damage, repeat);
+    let mut initial = None;
+    let mut areas = Vec::new();
+    let found = smallest_apart(grid, &finished.final_poses, &asked.robots_in_areas);
+    for (name, rectangle) in ('A'..='Z').zip(found) {
+        let Some(rectangle) = rectangle else { continue };
+        let Rectangle { x0, y0, x1, y1 } = rectangle;
+        let area = Area::new(grid, x0, y0, x1, y1)?;
+        let (scenario, trial) =
+            Damage::Remove(area).trial(conditions, &finished.final_poses, seeds, 0)?;
+        let outcome = run(
+            &Controller::new(&finished.genome),
+            &scenario,
+            &trial,
+            |_| {},
+        )?;
+        let [first, starts, removed] = three(rows(Damage::Remove(area), asked.repeat)?);
+        let [.., repositioned] = three(rows(Damage::Reposition(area), asked.repeat)?);
+        initial.get_or_insert((first, starts));
+        areas.push(DamagedArea {
+            name,
+            rectangle,
+            before: trial.starts,
+            after: outcome.final_poses,
+            removed,
+            repositioned,
+        });
+    }
+    let (initial, new_starts) = match initial {
+        Some(rows) => rows,
+        None => {
+            // No area has so many robots; what needs none is still shown.
+            let nowhere = Damage::Remove(Area::new(grid, 0, 0, 0, 0)?);
+            let [first, starts, _] = three(rows(nowhere, asked.repeat)?);
+            (first, starts)
+        }
+    };
+    Ok(Damaged {
+        label: group.label.clone(),
+        run: of.clone(),
+        initial,
+        new_starts,
+        areas,
+    })
+}
+
+fn three(rows: Vec<ResilienceRow>) -> [ResilienceRow; 3] {
+    rows.try_into()
+        .expect("as it evolved, from new starts, after damage")
+}
+
+/// Mean share at the end less mean share at the start.
+#[must_use]
+pub fn regained(row: &ResilienceRow) -> f64 {
+    mean(&row.share_end) - mean(&row.share_start)
+}

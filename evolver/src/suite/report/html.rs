@@ -1,0 +1,266 @@
+//! The report as one page that needs nothing else: pictures inline, no script, light and dark.
+
+use super::findings::Verdict;
+use super::markdown::{interval, ours, sentence, theirs, verdict};
+use super::tables::{Table, Value};
+use super::{Report, p_value};
+use std::fmt::Write;
+
+const STYLE: &str = "
+:root { color-scheme: light dark; --line: #8886; --soft: #777; --good: #2a7d2a; --bad: #b3261e; }
+@media (prefers-color-scheme: dark) { :root { --soft: #aaa; --good: #7ac77a; --bad: #ff8a80; } }
+body { font: 15px/1.5 system-ui, sans-serif; max-width: 1100px; margin: 2em auto; padding: 0 1em; }
+h1 { font-size: 1.6em; } h2 { margin-top: 2em; border-bottom: 1px solid var(--line); }
+h3 { margin: 2em 0 .5em; font-size: 1.05em; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .9em; }
+th, td { padding: .35em .7em; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
+thead th { border-bottom-width: 2px; }
+td b { white-space: nowrap; } small { color: var(--soft); display: block; }
+.good { color: var(--good); } .bad { color: var(--bad); font-weight: 600; } .open { color: var(--soft); }
+figure { margin: 2em 0; overflow-x: auto; } figcaption { color: var(--soft); font-size: .9em; }
+svg { max-width: 100%; height: auto; } code { font-size: .9em; overflow-wrap: anywhere; }
+";
+
+/// The whole page.
+#[must_use]
+pub fn page(report: &Report) -> String {
+    let title = format!("Report of the suite {}", report.suite);
+    let mut page = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{0}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{0}</h1>\n",
+        escape(&title)
+    );
+    for (heading, paragraphs) in opening(report) {
+        let _ = writeln!(page, "<h2>{}</h2>", escape(heading));
+        write_paragraphs(&mut page, &paragraphs);
+    }
+    write_findings(&mut page, report);
+    page += "<h2>Tables</h2>\n<p>Ours in bold, below it the 95 % interval and the paper's number.</p>\n";
+    for table in &report.tables {
+        write_table(&mut page, table);
+    }
+    page += "<h2>Figures</h2>\n";
+    for figure in &report.figures {
+        let _ = writeln!(
+            page,
+            "<figure role=\"img\" aria-label=\"{0}\">{1}<figcaption>{0} Data: \
+             <a href=\"{2}.csv\">{2}.csv</a>.</figcaption></figure>",
+            escape(&sentence(&figure.title)),
+            figure.svg,
+            escape(&figure.id)
+        );
+    }
+    write_making(&mut page, report);
+    page += "</body>\n</html>\n";
+    page
+}
+
+/// What comes first: what is missing, and where we differ.
+pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
+    let mut opening = Vec::new();
+    if !report.missing.is_empty() {
+        let mut lines = vec![
+            "Not all runs are finished; everything below is of those that are.".to_owned(),
+            String::new(),
+        ];
+        lines.extend(report.missing.iter().map(|line| format!("- {line}")));
+        opening.push(("Missing runs", lines));
+    }
+    if report.tests > 0 || !report.findings.is_empty() {
+        let mut lines = Vec::new();
+        for finding in report.different_findings() {
+            lines.push(format!("- {}: *differs*: {}", finding.claim, finding.ours));
+        }
+        if lines.is_empty() {
+            lines.push(
+                "No main finding of the paper that these runs can tell about differs.".into(),
+            );
+        } else {
+            lines.insert(
+                0,
+                "Main findings of the paper that do not hold in our runs:\n".into(),
+            );
+        }
+        lines.push(String::new());
+        lines.push(format!(
+            "Of {} tests of our numbers against the paper's, {} have p < {}; by chance alone about \
+             {:.0} would.\n",
+            report.tests,
+            report.differences.len(),
+            super::statistics::SIGNIFICANT,
+            super::statistics::SIGNIFICANT * report.tests as f64
+        ));
+        lines.extend(report.differences.iter().map(|line| format!("- {line}")));
+        opening.push(("Where we differ", lines));
+    }
+    opening
+}
+
+/// Heading of a table.
+pub(super) fn heading(table: &Table) -> String {
+    if table.source.is_empty() {
+        table.title.clone()
+    } else {
+        format!("{} — {}", table.source, table.title)
+    }
+}
+
+/// Paragraphs, and lists where lines begin with a dash.
+fn write_paragraphs(page: &mut String, lines: &[String]) {
+    let mut in_list = false;
+    for line in lines
+        .iter()
+        .map(|line| line.trim())
+        .filter(|line| !line.is_empty())
+    {
+        match line.strip_prefix("- ") {
+            Some(item) => {
+                if !in_list {
+                    page.push_str("<ul>\n");
+                }
+                in_list = true;
+                let _ = writeln!(
+                    page,
+                    "<li>{}</li>",
+                    escape(item).replace("*differs*", "<em>differs</em>")
+                );
+            }
+            None => {
+                if in_list {
+                    page.push_str("</ul>\n");
+                }
+                in_list = false;
+                let _ = writeln!(page, "<p>{}</p>", escape(line));
+            }
+        }
+    }
+    if in_list {
+        page.push_str("</ul>\n");
+    }
+}
+
+fn write_findings(page: &mut String, report: &Report) {
+    if report.findings.is_empty() {
+        return;
+    }
+    page.push_str(
+        "<h2>Main findings</h2>\n<div class=\"wide\"><table><thead><tr><th>the paper's finding</th>\
+         <th>ours</th><th>test</th><th>verdict</th></tr></thead><tbody>\n",
+    );
+    for finding in &report.findings {
+        let class = match finding.verdict {
+            Verdict::Holds => "good",
+            Verdict::Differs => "bad",
+            Verdict::NotEnoughRuns => "open",
+        };
+        let p = finding.p.map_or(String::new(), |p| {
+            format!("<small>{}</small>", escape(&p_value(p)))
+        });
+        let _ = writeln!(
+            page,
+            "<tr><td>{}</td><td>{}</td><td>{}{p}</td><td class=\"{class}\">{}</td></tr>",
+            escape(&finding.claim),
+            escape(&finding.ours),
+            escape(&finding.test),
+            finding.verdict.name()
+        );
+    }
+    page.push_str("</tbody></table></div>\n");
+}
+
+fn write_table(page: &mut String, table: &Table) {
+    let _ = write!(
+        page,
+        "<h3>{}</h3>\n<div class=\"wide\"><table><thead><tr><th></th>",
+        escape(&heading(table))
+    );
+    for column in &table.columns {
+        let _ = write!(page, "<th>{}</th>", escape(column));
+    }
+    page.push_str("</tr></thead><tbody>\n");
+    for row in &table.rows {
+        let _ = write!(
+            page,
+            "<tr><th>{}<small>{}</small></th>",
+            escape(&row.name),
+            escape(&row.counted)
+        );
+        for value in &row.values {
+            let _ = write!(
+                page,
+                "<td>{}</td>",
+                value.as_ref().map_or(String::new(), cell)
+            );
+        }
+        page.push_str("</tr>\n");
+    }
+    page.push_str("</tbody></table></div>\n<p>");
+    for note in &table.notes {
+        let _ = write!(page, "<small>{}</small>", escape(note));
+    }
+    let _ = writeln!(
+        page,
+        "<small>Data: <a href=\"{0}.csv\">{0}.csv</a>.</small></p>",
+        escape(&table.id)
+    );
+}
+
+fn cell(value: &Value) -> String {
+    let mut cell = ours(value).map_or("–".to_owned(), |ours| format!("<b>{}</b>", escape(&ours)));
+    if value.ours.is_none() && value.test.is_some() {
+        cell.clear();
+    }
+    if let Some(interval) = interval(value) {
+        let _ = write!(cell, "<small>{}</small>", escape(&interval));
+    }
+    if let Some(paper) = theirs(value) {
+        let _ = write!(cell, "<small>paper {}</small>", escape(&paper));
+    }
+    if let Some(verdict) = verdict(value) {
+        let class = if value.compatible == Some(true) {
+            "good"
+        } else {
+            "bad"
+        };
+        let _ = write!(
+            cell,
+            "<small class=\"{class}\">{}</small>",
+            escape(&verdict)
+        );
+    }
+    cell
+}
+
+fn write_making(page: &mut String, report: &Report) {
+    page.push_str(
+        "<h2>How it was made</h2>\n<div class=\"wide\"><table><thead><tr><th>runs</th><th>seeds</th>\
+         <th>command and program</th><th>hash of the runs' hashes</th></tr></thead><tbody>\n",
+    );
+    for making in &report.making {
+        let _ = writeln!(
+            page,
+            "<tr><td>{}: {}<small>{} of {}</small></td><td>{}</td><td><code>{}</code>\
+             <small>{}</small></td><td><code>{}</code></td></tr>",
+            escape(&making.experiment),
+            escape(&making.setting),
+            making.finished,
+            making.planned,
+            escape(&making.seeds),
+            escape(&making.command),
+            escape(&making.programs),
+            making.hash
+        );
+    }
+    page.push_str(
+        "</tbody></table></div>\n<p>Every run with its seed and hash: <a href=\"runs.csv\">runs.csv</a>.</p>\n",
+    );
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}

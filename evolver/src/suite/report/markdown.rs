@@ -1,0 +1,154 @@
+//! The report as Markdown.
+
+use super::tables::{Table, Value};
+use super::{Report, number, p_value};
+use std::fmt::Write;
+
+/// The whole report.
+#[must_use]
+pub fn text(report: &Report) -> String {
+    let mut text = format!("# Report of the suite {}\n", report.suite);
+    for (heading, paragraphs) in super::html::opening(report) {
+        let _ = write!(text, "\n## {heading}\n\n");
+        for paragraph in paragraphs {
+            let _ = writeln!(text, "{paragraph}");
+        }
+    }
+    if !report.findings.is_empty() {
+        text += "\n## Main findings\n\n| the paper's finding | ours | test | p | verdict |\n|---|---|---|---|---|\n";
+        for finding in &report.findings {
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} | *{}* |",
+                finding.claim,
+                finding.ours,
+                finding.test,
+                finding.p.map_or("–".to_owned(), p_value),
+                finding.verdict.name()
+            );
+        }
+    }
+    text += "\n## Tables\n\nOurs [95 % interval] · paper's.\n";
+    for table in &report.tables {
+        write_table(&mut text, table);
+    }
+    text += "\n## Figures\n";
+    for figure in &report.figures {
+        let _ = write!(
+            text,
+            "\n![{}]({}.svg)\n\n{} Data: [{}.csv]({}.csv).\n",
+            figure.title,
+            figure.id,
+            sentence(&figure.title),
+            figure.id,
+            figure.id
+        );
+    }
+    text += "\n## How it was made\n\n| experiment | setting | runs | seeds | command | program | hash of the runs' hashes |\n|---|---|---|---|---|---|---|\n";
+    for making in &report.making {
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} of {} | {} | `{}` | {} | `{}` |",
+            making.experiment,
+            making.setting,
+            making.finished,
+            making.planned,
+            making.seeds,
+            making.command,
+            making.programs,
+            making.hash
+        );
+    }
+    text += "\nEvery run with its seed and hash: [runs.csv](runs.csv).\n";
+    text
+}
+
+/// With a full stop.
+pub(super) fn sentence(words: &str) -> String {
+    format!("{words}.")
+}
+
+fn write_table(text: &mut String, table: &Table) {
+    let _ = write!(text, "\n### {}\n\n| |", super::html::heading(table));
+    for column in &table.columns {
+        let _ = write!(text, " {column} |");
+    }
+    let _ = writeln!(text, "\n|---|{}", "---|".repeat(table.columns.len()));
+    for row in &table.rows {
+        let _ = write!(text, "| {} |", name(&row.name, &row.counted));
+        for value in &row.values {
+            let _ = write!(text, " {} |", value.as_ref().map_or(String::new(), cell));
+        }
+        text.push('\n');
+    }
+    text.push('\n');
+    for note in &table.notes {
+        let _ = writeln!(text, "- {note}");
+    }
+    let _ = writeln!(text, "- Data: [{}.csv]({}.csv).", table.id, table.id);
+}
+
+fn name(name: &str, counted: &str) -> String {
+    if counted.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{name} ({counted})")
+    }
+}
+
+fn cell(value: &Value) -> String {
+    let parts = [
+        ours(value),
+        interval(value).map(|interval| format!("[{interval}]")),
+        theirs(value).map(|paper| format!("· {paper}")),
+        verdict(value),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    if parts.is_empty() {
+        "–".to_owned()
+    } else {
+        parts.join(" ")
+    }
+}
+
+/// Our number, with the median in brackets if it is a mean.
+pub(super) fn ours(value: &Value) -> Option<String> {
+    with_median(value.ours, value.ours_median, value.digits)
+}
+
+/// The paper's number, likewise.
+pub(super) fn theirs(value: &Value) -> Option<String> {
+    with_median(value.paper, value.paper_median, value.digits)
+}
+
+fn with_median(mean: Option<f64>, median: Option<f64>, digits: usize) -> Option<String> {
+    let mean = number(mean?, digits);
+    Some(match median {
+        Some(median) => format!("{mean} ({})", number(median, digits)),
+        None => mean,
+    })
+}
+
+/// The 95 % interval.
+pub(super) fn interval(value: &Value) -> Option<String> {
+    let (low, high) = (value.low?, value.high?);
+    Some(format!(
+        "{}–{}",
+        number(low, value.digits),
+        number(high, value.digits)
+    ))
+}
+
+/// What the test says.
+pub(super) fn verdict(value: &Value) -> Option<String> {
+    let compatible = if value.compatible? {
+        "compatible"
+    } else {
+        "differs"
+    };
+    Some(format!(
+        "{compatible}, {} ({})",
+        p_value(value.p?),
+        value.test?
+    ))
+}

@@ -1,0 +1,480 @@
+//! The report of a suite: its tables, figures and findings beside the paper's, with intervals and
+//! tests.
+//!
+//! [`gather`] reads the finished runs and does what is made of them afterwards; [`tables`],
+//! [`figures`] and [`findings`] compute from that and from [`paper`]'s numbers; [`markdown`] and
+//! [`html`] only write it down.
+
+pub mod damage_areas;
+pub mod figures;
+pub mod findings;
+pub mod gather;
+pub mod html;
+pub mod markdown;
+pub mod paper;
+pub mod statistics;
+pub mod tables;
+
+use super::Suite;
+use super::plan::Plan;
+use crate::files::{self, FileError};
+use crate::finished_run::ReadRunError;
+use figures::{Figure, FigureError};
+use findings::{Finding, Verdict};
+use gather::{Gathered, Group};
+use minimal_surprise_sim::{DamageError, Structure, WorldError};
+use paper::PaperValues;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use tables::Table;
+
+/// A report cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// A finished run cannot be read.
+    #[error(transparent)]
+    Run(#[from] ReadRunError),
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A file of a run is not the JSON that it should be.
+    #[error("{}: {error}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        error: serde_json::Error,
+    },
+    /// A file of a run is not the CSV that it should be.
+    #[error("{}: {error}", path.display())]
+    Csv {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        error: csv::Error,
+    },
+    /// A final state is not one.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// A structure cannot be damaged.
+    #[error(transparent)]
+    Damage(#[from] DamageError),
+    /// A suite names a structure that there is not.
+    #[error("structure = {name:?}: structures are {}", Structure::ALL.map(Structure::name).join(", "))]
+    UnknownStructure {
+        /// What it is called there.
+        name: String,
+    },
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// The report as a page.
+    pub html: PathBuf,
+    /// The report as text.
+    pub markdown: PathBuf,
+    /// Every file.
+    pub files: Vec<PathBuf>,
+    /// Runs that are finished, each experiment's counted.
+    pub finished: usize,
+    /// Runs that are planned.
+    pub planned: usize,
+}
+
+/// How the runs of a setting were made.
+#[derive(Clone, Debug, Serialize)]
+pub struct Making {
+    /// The experiment.
+    pub experiment: String,
+    /// The setting.
+    pub setting: String,
+    /// Runs that are finished.
+    pub finished: usize,
+    /// Runs that are planned.
+    pub planned: usize,
+    /// First and last seed of those finished.
+    pub seeds: String,
+    /// Programs that did them.
+    pub programs: String,
+    /// SHA-256 of the runs' hashes, in order of their seeds.
+    pub hash: String,
+    /// The command that does them.
+    pub command: String,
+}
+
+/// Everything that a report says.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Name of the suite.
+    pub suite: String,
+    /// Experiments that lack runs, in words.
+    pub missing: Vec<String>,
+    /// The findings.
+    pub findings: Vec<Finding>,
+    /// Where tests speak against our numbers and the paper's being the same, in words.
+    pub differences: Vec<String>,
+    /// Tests made in the tables.
+    pub tests: usize,
+    /// The tables.
+    pub tables: Vec<Table>,
+    /// The figures.
+    pub figures: Vec<Figure>,
+    /// How it was made.
+    pub making: Vec<Making>,
+}
+
+#[derive(Serialize)]
+struct RunRow<'a> {
+    experiment: &'a str,
+    setting: &'a str,
+    id: &'a str,
+    seed: u64,
+    structures: String,
+    share: f64,
+    fitness: f64,
+    movement: f64,
+    intended_movement: f64,
+    horizontal_lines: u32,
+    vertical_lines: u32,
+    spanning_lines: u32,
+    hash: &'a str,
+    program: &'a str,
+}
+
+/// Writes the report of a plan's finished runs, with the data of its tables and figures as CSV.
+/// `directory` is that of the suite, `out` that of the report, which is made.
+///
+/// # Errors
+/// [`ReportError`] if a finished run cannot be read or a file cannot be written.
+pub fn write(
+    plan: &Plan,
+    suite: &Suite,
+    directory: &Path,
+    out: &Path,
+) -> Result<Written, ReportError> {
+    let gathered = Gathered::read(plan, suite, directory)?;
+    let report = Report::of(&gathered, &suite.name)?;
+    let mut files = vec![
+        ("report.html".to_owned(), html::page(&report)),
+        ("report.md".to_owned(), markdown::text(&report)),
+        ("runs.csv".to_owned(), csv_text(&run_rows(&gathered.groups))),
+        ("findings.csv".to_owned(), csv_text(&report.findings)),
+        ("how-made.csv".to_owned(), csv_text(&report.making)),
+    ];
+    for table in &report.tables {
+        let values: Vec<_> = table.values().collect();
+        files.push((format!("{}.csv", table.id), csv_text(&values)));
+    }
+    for figure in &report.figures {
+        files.push((format!("{}.svg", figure.id), figure.svg.clone()));
+        files.push((format!("{}.csv", figure.id), figure.csv.clone()));
+    }
+    std::fs::create_dir_all(out).map_err(FileError::at(out))?;
+    let mut written = Vec::new();
+    for (name, contents) in files {
+        let path = out.join(name);
+        files::replace(&path, contents.as_bytes())?;
+        written.push(path);
+    }
+    Ok(Written {
+        html: out.join("report.html"),
+        markdown: out.join("report.md"),
+        files: written,
+        finished: gathered.groups.iter().map(|group| group.runs.len()).sum(),
+        planned: gathered.groups.iter().map(|group| group.planned).sum(),
+    })
+}
+
+impl Report {
+    /// The report of gathered runs.
+    ///
+    /// # Errors
+    /// [`ReportError`] if a figure cannot be drawn.
+    pub fn of(gathered: &Gathered, suite: &str) -> Result<Self, ReportError> {
+        let paper = PaperValues::for_suite(suite);
+        let tables = tables::all(gathered, &paper);
+        let missing = gathered
+            .groups
+            .iter()
+            .filter(|group| !group.is_complete())
+            .map(|group| format!("{}, {}: {}", group.experiment, group.label, group.counted()));
+        Ok(Self {
+            suite: suite.to_owned(),
+            missing: missing.collect(),
+            findings: findings::all(gathered, &paper),
+            differences: differences(&tables),
+            tests: tables
+                .iter()
+                .flat_map(Table::values)
+                .filter(|v| v.p.is_some())
+                .count(),
+            figures: figures::all(gathered, &paper)?,
+            making: gathered
+                .groups
+                .iter()
+                .map(|group| making(group, suite))
+                .collect(),
+            tables,
+        })
+    }
+
+    /// Findings of the paper that do not hold here.
+    pub fn different_findings(&self) -> impl Iterator<Item = &Finding> {
+        self.findings
+            .iter()
+            .filter(|finding| finding.verdict == Verdict::Differs)
+    }
+}
+
+fn differences(tables: &[Table]) -> Vec<String> {
+    let mut words = Vec::new();
+    for table in tables {
+        for value in table
+            .values()
+            .filter(|value| value.compatible == Some(false))
+        {
+            let source = if table.source.is_empty() {
+                &table.id
+            } else {
+                &table.source
+            };
+            let numbers = match (
+                value.ours_median.or(value.ours),
+                value.paper_median.or(value.paper),
+            ) {
+                (Some(ours), Some(paper)) => {
+                    format!(
+                        ": {} for {}",
+                        number(ours, value.digits),
+                        number(paper, value.digits)
+                    )
+                }
+                _ => String::new(),
+            };
+            words.push(format!(
+                "{source}, {}, {}{numbers} ({}, {})",
+                value.setting,
+                value.what,
+                value.test.unwrap_or_default(),
+                p_value(value.p.unwrap_or(1.0))
+            ));
+        }
+    }
+    words
+}
+
+/// A number with so many digits after the point, without a sign if it is zero.
+fn number(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        _ => text,
+    }
+}
+
+/// A p-value in words.
+fn p_value(p: f64) -> String {
+    if p < 0.001 {
+        "p < 0.001".to_owned()
+    } else {
+        format!("p = {p:.3}")
+    }
+}
+
+fn making(group: &Group, suite: &str) -> Making {
+    let mut seeds = group.runs.iter().map(|run| run.finished.settings.seed);
+    let programs: BTreeSet<&str> = group.runs.iter().map(|run| run.program.as_str()).collect();
+    let mut hash = Sha256::new();
+    for run in &group.runs {
+        hash.update(run.finished.hash.as_bytes());
+        hash.update(b"\n");
+    }
+    let hash: String = hash
+        .finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    let called = if suite == "paper" {
+        "evolver paper".to_owned()
+    } else {
+        format!("evolver suite {suite}.toml")
+    };
+    Making {
+        experiment: group.experiment.clone(),
+        setting: group.label.clone(),
+        finished: group.runs.len(),
+        planned: group.planned,
+        seeds: match (seeds.next(), seeds.next_back()) {
+            (Some(first), Some(last)) => format!("{first} to {last}"),
+            (Some(only), None) => only.to_string(),
+            _ => String::new(),
+        },
+        programs: programs.into_iter().collect::<Vec<_>>().join("; "),
+        hash: if group.runs.is_empty() {
+            String::new()
+        } else {
+            hash
+        },
+        command: format!("{called} run --only {}", group.experiment),
+    }
+}
+
+fn run_rows(groups: &[Group]) -> Vec<RunRow<'_>> {
+    let mut rows = Vec::new();
+    for group in groups {
+        for run in &group.runs {
+            let names: Vec<&str> = run.names.iter().map(|name| name.name()).collect();
+            rows.push(RunRow {
+                experiment: &group.experiment,
+                setting: &group.label,
+                id: &run.id,
+                seed: run.finished.settings.seed,
+                structures: names.join(";"),
+                share: run.named_share(),
+                fitness: run.fitness(),
+                movement: run.movement,
+                intended_movement: run.intended_movement,
+                horizontal_lines: run.lines.horizontal,
+                vertical_lines: run.lines.vertical,
+                spanning_lines: run.lines.spanning,
+                hash: &run.finished.hash,
+                program: &run.program,
+            });
+        }
+    }
+    rows
+}
+
+/// Rows as CSV.
+fn csv_text(rows: &[impl Serialize]) -> String {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        table
+            .serialize(row)
+            .expect("plain rows are written to memory");
+    }
+    let bytes = table.into_inner().expect("memory needs no flushing");
+    String::from_utf8(bytes).expect("text stays text")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::finished_run::FinishedRun;
+    use crate::reevaluation::median;
+    use crate::suite::work::{Worked, work_on};
+    use std::collections::BTreeMap;
+    use std::sync::atomic::AtomicBool;
+
+    const OWN: &str = "
+        name = \"own\"
+        [[experiment]]
+        name = \"two\"
+        runs = 3
+        grids = [\"8x8\"]
+        robots = [20, 28]
+        population = 6
+        generations = 3
+        repetitions = 2
+        steps = 30
+        [[re-evaluation]]
+        name = \"again\"
+        of = [\"two\"]
+        starts = 3
+        [[resilience]]
+        name = \"damage\"
+        of = \"two\"
+        structure = \"random dispersion\"
+        robots-in-areas = [3, 2]
+        repeat = 4
+    ";
+
+    /// The numbers of a table's CSV by setting and column.
+    fn ours(out: &Path, table: &str) -> BTreeMap<(String, String), f64> {
+        let mut reader = csv::Reader::from_path(out.join(table)).unwrap();
+        let rows = reader.deserialize::<BTreeMap<String, String>>();
+        rows.map(|row| row.unwrap())
+            .filter_map(|row| {
+                let key = (row["setting"].clone(), row["what"].clone());
+                Some((key, row["ours"].parse().ok()?))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_reports_numbers_are_those_of_its_runs() {
+        let scratch = tempfile::tempdir().unwrap();
+        let (directory, out) = (scratch.path().join("suite"), scratch.path().join("report"));
+        std::fs::create_dir(&directory).unwrap();
+        let file = scratch.path().join("own.toml");
+        std::fs::write(&file, OWN).unwrap();
+        let suite = Suite::read(&file).unwrap();
+        let plan = Plan::new(&suite, None, None, false).unwrap();
+        let runs = plan.runs();
+        let (last, others) = runs.split_last().unwrap();
+        for run in others {
+            let worked = work_on(run, &directory, &AtomicBool::new(false), |_| {});
+            assert_eq!(worked.unwrap(), Worked::Completed);
+        }
+        assert!(!last.directory(&directory).exists());
+
+        let written = write(&plan, &suite, &directory, &out).unwrap();
+        assert_eq!((written.finished, written.planned), (5, 6));
+        assert!(written.files.iter().all(|file| file.is_file()));
+        let markdown = std::fs::read_to_string(&written.markdown).unwrap();
+        assert!(markdown.contains("2 of 3 runs"), "{markdown}");
+        assert!(
+            !markdown.contains("differs"),
+            "there is no paper to differ from"
+        );
+        let page = std::fs::read_to_string(&written.html).unwrap();
+        assert!(page.contains("<svg") && !page.contains("src="));
+
+        let numbers = ours(&out, "numbers-two.csv");
+        let shares = ours(&out, "structures-two.csv");
+        for settings in &plan.experiments[0].settings {
+            let setting = format!("two: {}", settings.label);
+            let finished: Vec<_> = settings
+                .runs
+                .iter()
+                .filter_map(|run| FinishedRun::read(&run.directory(&directory)).ok())
+                .collect();
+            let fitness: Vec<f64> = finished
+                .iter()
+                .map(|run| run.measures().unwrap().fitness())
+                .collect();
+            let what = tables::MEDIAN_BEST_FITNESS.to_owned();
+            assert_eq!(numbers[&(setting.clone(), what)], median(&fitness));
+            let mut of_runs: BTreeMap<&str, f64> = BTreeMap::new();
+            for run in &finished {
+                let grid = run.settings.scenario.grid();
+                let names = minimal_surprise_sim::classify(grid, &run.final_poses)
+                    .unwrap()
+                    .names();
+                for name in &names {
+                    *of_runs.entry(name.name()).or_default() +=
+                        100.0 / names.len() as f64 / finished.len() as f64;
+                }
+            }
+            for (name, percent) in of_runs {
+                let found = shares[&(setting.clone(), name.to_owned())];
+                assert!((found - percent).abs() < 1e-9, "{setting}, {name}");
+            }
+        }
+
+        let again = write(&plan, &suite, &directory, &scratch.path().join("again")).unwrap();
+        for (first, second) in written.files.iter().zip(&again.files) {
+            assert_eq!(
+                std::fs::read(first).unwrap(),
+                std::fs::read(second).unwrap(),
+                "the same runs give the same report"
+            );
+        }
+    }
+}

@@ -1,0 +1,282 @@
+//! The paper's numbers, from `paper-values.toml`.
+
+use minimal_surprise_sim::structures::Structure;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// All of them.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PaperValues {
+    /// Shares of runs.
+    #[serde(rename = "distribution")]
+    pub distributions: Vec<Distribution>,
+    /// Single numbers.
+    #[serde(rename = "number")]
+    pub numbers: Vec<Number>,
+    /// What runs of a structure are like.
+    #[serde(rename = "structure")]
+    pub structures: Vec<StructureValues>,
+    /// What became of damaged structures.
+    #[serde(rename = "damage")]
+    pub damages: Vec<DamageValues>,
+    /// By how much partly predefining a line raises the share of line runs.
+    pub raised: Vec<Raised>,
+}
+
+/// What the shares of a distribution are of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Of {
+    /// Runs, by the structure they are named after.
+    #[default]
+    Structures,
+    /// Runs, by the way their lines go.
+    Orientation,
+    /// Genomes, by the way their lines go from most of their new starts.
+    #[serde(rename = "new starts")]
+    NewStarts,
+}
+
+/// How many percent of the runs came to what.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Distribution {
+    /// Table or section.
+    pub source: String,
+    /// Another table that repeats it.
+    pub also: Option<String>,
+    /// The experiment.
+    pub experiment: String,
+    /// The label of the setting.
+    pub setting: String,
+    /// What of.
+    #[serde(default)]
+    pub of: Of,
+    /// Number of runs.
+    pub runs: u32,
+    /// What to know about it.
+    pub note: Option<String>,
+    /// The shares as printed.
+    pub percent: BTreeMap<String, f64>,
+}
+
+impl Distribution {
+    /// The paper's share of a category, in percent; those not printed are 0.
+    #[must_use]
+    pub fn percent(&self, category: &str) -> f64 {
+        self.percent.get(category).copied().unwrap_or(0.0)
+    }
+
+    /// Whole runs of each of the categories: a tied run, printed as parts, counts for the first of
+    /// them.
+    #[must_use]
+    pub fn runs(&self, categories: &[String]) -> Vec<u32> {
+        let exact = |category: &String| self.percent(category) / 100.0 * f64::from(self.runs);
+        // Shares are printed to the half percent, so that anything below a fifth is rounding.
+        let mut counts: Vec<u32> = categories
+            .iter()
+            .map(|category| (exact(category) + 0.2).floor() as u32)
+            .collect();
+        let printed: f64 = categories.iter().map(exact).sum();
+        let mut left = (printed.round() as u32).saturating_sub(counts.iter().sum());
+        for (count, category) in counts.iter_mut().zip(categories) {
+            if left > 0 && exact(category) - f64::from(*count) > 0.2 {
+                *count += 1;
+                left -= 1;
+            }
+        }
+        counts
+    }
+}
+
+/// A single number.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Number {
+    /// Table or section.
+    pub source: String,
+    /// The experiment.
+    pub experiment: String,
+    /// The label of the setting.
+    pub setting: String,
+    /// What it is.
+    pub measure: String,
+    /// The number.
+    pub value: f64,
+    /// One in its last digit.
+    pub last_digit: f64,
+}
+
+/// A mean and a median.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeanMedian {
+    /// The mean.
+    pub mean: f64,
+    /// The median, if it is printed.
+    pub median: Option<f64>,
+}
+
+/// What runs of a structure are like.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct StructureValues {
+    /// Table.
+    pub source: String,
+    /// The experiment.
+    pub experiment: String,
+    /// The label of the setting.
+    pub setting: String,
+    /// The structure.
+    pub structure: String,
+    /// Robots in it, in percent.
+    pub robots_percent: MeanMedian,
+    /// Fitness.
+    pub fitness: MeanMedian,
+    /// Movement M.
+    pub movement: MeanMedian,
+    /// Intended movement I.
+    pub intended_movement: MeanMedian,
+}
+
+/// What became of a damaged structure.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct DamageValues {
+    /// Table.
+    pub source: String,
+    /// The resilience experiment.
+    pub resilience: String,
+    /// What was done.
+    pub row: String,
+    /// Fitness.
+    pub fitness: MeanMedian,
+    /// Robots in the structure at the start, in percent.
+    pub start_percent: MeanMedian,
+    /// Robots in the structure at the end, in percent.
+    pub end_percent: MeanMedian,
+    /// Similarity to the undamaged final state.
+    pub similarity: MeanMedian,
+}
+
+/// By how many points a share was raised.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Raised {
+    /// Section.
+    pub source: String,
+    /// The grid.
+    pub grid: String,
+    /// Percentage points.
+    pub points: f64,
+}
+
+impl PaperValues {
+    /// The paper's numbers for a suite: all for the paper's, none for another.
+    #[must_use]
+    pub fn for_suite(name: &str) -> Self {
+        let all: Self = toml::from_str(include_str!("../paper-values.toml"))
+            .expect("a test reads the file that is built in");
+        if name == "paper" { all } else { Self::none() }
+    }
+
+    fn none() -> Self {
+        Self {
+            distributions: Vec::new(),
+            numbers: Vec::new(),
+            structures: Vec::new(),
+            damages: Vec::new(),
+            raised: Vec::new(),
+        }
+    }
+
+    /// A distribution.
+    #[must_use]
+    pub fn distribution(&self, of: Of, experiment: &str, setting: &str) -> Option<&Distribution> {
+        self.distributions
+            .iter()
+            .find(|d| d.of == of && d.experiment == experiment && d.setting == setting)
+    }
+
+    /// A single number.
+    #[must_use]
+    pub fn number(&self, experiment: &str, setting: &str, measure: &str) -> Option<&Number> {
+        self.numbers
+            .iter()
+            .find(|n| n.experiment == experiment && n.setting == setting && n.measure == measure)
+    }
+}
+
+/// The three groupings together.
+pub const GROUPING: &str = "grouping";
+
+/// Runs named after no structure.
+pub const NONE: &str = "none";
+
+/// Whether a structure is one of the three groupings.
+#[must_use]
+pub fn is_grouping(structure: Structure) -> bool {
+    matches!(
+        structure,
+        Structure::Aggregation | Structure::Clustering | Structure::LooseGrouping
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::suite::Suite;
+    use crate::suite::plan::Plan;
+    use minimal_surprise_sim::structures::LineOrientation;
+
+    #[test]
+    fn every_number_belongs_to_a_setting_of_the_papers_suite() {
+        let suite = Suite::paper().unwrap();
+        let plan = Plan::new(&suite, None, None, false).unwrap();
+        let values = PaperValues::for_suite("paper");
+        let exists = |experiment: &str, setting: &str| {
+            let found = plan.experiments.iter().any(|planned| {
+                planned.name == experiment && planned.settings.iter().any(|s| s.label == setting)
+            });
+            assert!(found, "{experiment}: {setting}");
+        };
+        for distribution in &values.distributions {
+            exists(&distribution.experiment, &distribution.setting);
+            let sum: f64 = distribution.percent.values().sum();
+            assert!((sum - 100.0).abs() < 1e-9, "{distribution:?}");
+            for category in distribution.percent.keys() {
+                let structure = Structure::ALL.iter().any(|s| s.name() == category);
+                let orientation = LineOrientation::ALL.iter().any(|o| o.name() == category);
+                let other = [GROUPING, "diverse"].contains(&category.as_str());
+                assert!(structure || orientation || other, "{category}");
+            }
+        }
+        for number in &values.numbers {
+            exists(&number.experiment, &number.setting);
+        }
+        for structure in &values.structures {
+            exists(&structure.experiment, &structure.setting);
+        }
+        for damage in &values.damages {
+            assert!(
+                suite
+                    .resiliences
+                    .iter()
+                    .any(|r| r.name == damage.resilience)
+            );
+        }
+    }
+
+    #[test]
+    fn tied_runs_of_the_paper_count_for_the_first_structure() {
+        let values = PaperValues::for_suite("paper");
+        let names = ["line", "pair", "clustering", "random dispersion"].map(str::to_owned);
+        let runs = |experiment: &str| {
+            let found = values.distribution(Of::Structures, experiment, "C, 20x20");
+            found.unwrap().runs(&names)
+        };
+        assert_eq!(runs("sensor-models"), [5, 5, 2, 8]);
+        assert_eq!(runs("densities"), [13, 13, 3, 21]);
+    }
+}

@@ -1,0 +1,343 @@
+//! Intervals and tests: how sure a number is, and whether two findings may be the same.
+//!
+//! Everything random has a fixed seed, so that the same runs give the same report.
+
+use crate::reevaluation::median;
+use minimal_surprise_sim::seed::uniform_below;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use statrs::distribution::{Binomial, ContinuousCDF, Discrete, Normal};
+use statrs::function::factorial::ln_factorial;
+
+/// Seed of everything drawn here.
+const SEED: u64 = 2021;
+/// Resamples of a bootstrap.
+const RESAMPLES: usize = 10_000;
+/// Tables that an exact test looks at; with more, tables are drawn.
+const EXACT_TABLES_MAX: u64 = 3_000_000;
+/// Tables drawn where there are too many for an exact test.
+const DRAWN_TABLES: u32 = 100_000;
+/// Normal quantile of a two-sided 95 % interval.
+const Z_95: f64 = 1.959_963_984_540_054;
+/// A test below this speaks against two findings being the same.
+pub const SIGNIFICANT: f64 = 0.05;
+/// Two probabilities of tables this much apart, relatively, are the same but for rounding.
+const SAME_PROBABILITY: f64 = 1e-7;
+
+/// A range with its ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// A test's name and what it came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Test {
+    /// Its name.
+    pub name: &'static str,
+    /// Probability of something at least as extreme if there is no difference.
+    pub p: f64,
+}
+
+impl Test {
+    /// Whether it does not speak against the two being the same.
+    #[must_use]
+    pub fn compatible(self) -> bool {
+        self.p >= SIGNIFICANT
+    }
+}
+
+/// Wilson's 95 % interval of a share; tied runs make halves of successes. None of nothing.
+#[must_use]
+pub fn wilson(successes: f64, of: f64) -> Option<Interval> {
+    if of <= 0.0 {
+        return None;
+    }
+    let share = successes / of;
+    let z2 = Z_95 * Z_95;
+    let middle = (share + z2 / (2.0 * of)) / (1.0 + z2 / of);
+    let half = Z_95 / (1.0 + z2 / of) * (share * (1.0 - share) / of + z2 / (4.0 * of * of)).sqrt();
+    Some(Interval {
+        low: (middle - half).max(0.0),
+        high: (middle + half).min(1.0),
+    })
+}
+
+/// 95 % interval of a median: 2.5 and 97.5 % quantile of the medians of resamples. None of nothing.
+#[must_use]
+pub fn median_interval(values: &[f64]) -> Option<Interval> {
+    if values.is_empty() {
+        return None;
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let mut sample = vec![0.0; values.len()];
+    let mut medians: Vec<f64> = (0..RESAMPLES)
+        .map(|_| {
+            for drawn in &mut sample {
+                *drawn = values[uniform_below(&mut rng, values.len() as u64) as usize];
+            }
+            median(&sample)
+        })
+        .collect();
+    medians.sort_by(f64::total_cmp);
+    Some(Interval {
+        low: quantile(&medians, 0.025),
+        high: quantile(&medians, 0.975),
+    })
+}
+
+/// Quantile of ascending values, linear between them; 0 of nothing.
+#[must_use]
+pub fn quantile(ascending: &[f64], share: f64) -> f64 {
+    let Some(last) = ascending.len().checked_sub(1) else {
+        return 0.0;
+    };
+    let place = share * last as f64;
+    let below = place.floor() as usize;
+    let above = (below + 1).min(last);
+    ascending[below] + (place - below as f64) * (ascending[above] - ascending[below])
+}
+
+/// Whether two rows of counts may come from the same distribution: Fisher's exact test in Freeman
+/// and Halton's form for 2 × c tables, by looking at every table with the same margins; if those are
+/// too many, by drawing such tables. 1 if a row or all but one column are empty.
+#[must_use]
+pub fn fisher(first: &[u32], second: &[u32]) -> Test {
+    assert_eq!(first.len(), second.len(), "both rows have the same columns");
+    let columns: Vec<(u32, u32)> = first
+        .iter()
+        .zip(second)
+        .map(|(&one, &two)| (one, one + two))
+        .filter(|&(_, total)| total > 0)
+        .collect();
+    let row: u32 = columns.iter().map(|&(one, _)| one).sum();
+    let totals: Vec<u32> = columns.iter().map(|&(_, total)| total).collect();
+    let observed: f64 = columns
+        .iter()
+        .map(|&(one, total)| ln_choose(total, one))
+        .sum();
+    let largest = totals.iter().copied().max().unwrap_or(0);
+    let tables = totals.iter().fold(1_u64, |product, &total| {
+        product.saturating_mul(u64::from(total) + 1)
+    }) / (u64::from(largest) + 1);
+    if tables <= EXACT_TABLES_MAX {
+        Test {
+            name: "Fisher's exact test",
+            p: exact(&totals, row, observed),
+        }
+    } else {
+        Test {
+            name: "Fisher's test, tables drawn",
+            p: drawn(&totals, row, observed),
+        }
+    }
+}
+
+fn ln_choose(of: u32, chosen: u32) -> f64 {
+    ln_factorial(of.into()) - ln_factorial(chosen.into()) - ln_factorial((of - chosen).into())
+}
+
+fn exact(totals: &[u32], row: u32, observed: f64) -> f64 {
+    // The largest column last: it is what the others leave.
+    let mut totals = totals.to_vec();
+    totals.sort_unstable();
+    let all: u32 = totals.iter().sum();
+    let least = observed + SAME_PROBABILITY;
+    let norm = ln_choose(all, row);
+    let mut p = 0.0;
+    let mut visit = |ln_probability: f64| {
+        if ln_probability <= least {
+            p += (ln_probability - norm).exp();
+        }
+    };
+    every_table(&totals, row, 0.0, &mut visit);
+    p.min(1.0)
+}
+
+/// Shows the logarithm of the number of ways of every first row with this sum.
+fn every_table(totals: &[u32], row: u32, ways: f64, visit: &mut impl FnMut(f64)) {
+    match totals {
+        [] if row == 0 => visit(ways),
+        [last] if row <= *last => visit(ways + ln_choose(*last, row)),
+        [first, rest @ ..] if !rest.is_empty() => {
+            for count in 0..=row.min(*first) {
+                every_table(rest, row - count, ways + ln_choose(*first, count), visit);
+            }
+        }
+        _ => {}
+    }
+}
+
+fn drawn(totals: &[u32], row: u32, observed: f64) -> f64 {
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let mut items: Vec<usize> = totals
+        .iter()
+        .enumerate()
+        .flat_map(|(column, &total)| std::iter::repeat_n(column, total as usize))
+        .collect();
+    let mut extreme = 0_u32;
+    for _ in 0..DRAWN_TABLES {
+        let mut counts = vec![0_u32; totals.len()];
+        for place in 0..row as usize {
+            let left = (items.len() - place) as u64;
+            items.swap(place, place + uniform_below(&mut rng, left) as usize);
+            counts[items[place]] += 1;
+        }
+        let ways: f64 = totals
+            .iter()
+            .zip(&counts)
+            .map(|(&total, &count)| ln_choose(total, count))
+            .sum();
+        extreme += u32::from(ways <= observed + SAME_PROBABILITY);
+    }
+    f64::from(extreme + 1) / f64::from(DRAWN_TABLES + 1)
+}
+
+/// Whether successes and failures may be equally likely: exact binomial test, two-sided.
+#[must_use]
+pub fn sign(successes: u32, failures: u32) -> Test {
+    let of = u64::from(successes) + u64::from(failures);
+    let p = Binomial::new(0.5, of).map_or(1.0, |even| {
+        let observed = even.pmf(successes.into()) * (1.0 + SAME_PROBABILITY);
+        let extreme = (0..=of).map(|k| even.pmf(k)).filter(|&p| p <= observed);
+        extreme.sum::<f64>().min(1.0)
+    });
+    Test {
+        name: "sign test",
+        p,
+    }
+}
+
+/// Whether a median may be this value, given to within half a unit of its last digit: sign test of
+/// the values beyond that.
+#[must_use]
+pub fn median_is(values: &[f64], median: f64, rounding: f64) -> Test {
+    let above = values.iter().filter(|&&v| v > median + rounding).count();
+    let below = values.iter().filter(|&&v| v < median - rounding).count();
+    sign(above as u32, below as u32)
+}
+
+/// Whether one sample tends to larger values than the other: Mann and Whitney's test, two-sided,
+/// normal approximation with correction for ties and continuity.
+#[must_use]
+pub fn mann_whitney(first: &[f64], second: &[f64]) -> Test {
+    let (n, m) = (first.len() as f64, second.len() as f64);
+    let mut u = 0.0;
+    for one in first {
+        for two in second {
+            u += match one.total_cmp(two) {
+                std::cmp::Ordering::Greater => 1.0,
+                std::cmp::Ordering::Equal => 0.5,
+                std::cmp::Ordering::Less => 0.0,
+            };
+        }
+    }
+    let mut all: Vec<f64> = first.iter().chain(second).copied().collect();
+    all.sort_by(f64::total_cmp);
+    let total = n + m;
+    let ties: f64 = all
+        .chunk_by(|a, b| a == b)
+        .map(|tied| {
+            let t = tied.len() as f64;
+            t * t * t - t
+        })
+        .sum();
+    let variance = n * m / 12.0 * (total + 1.0 - ties / (total * (total - 1.0)));
+    let distance = ((u - n * m / 2.0).abs() - 0.5).max(0.0);
+    let p = if variance > 0.0 {
+        2.0 * Normal::standard().sf(distance / variance.sqrt())
+    } else {
+        1.0
+    };
+    Test {
+        name: "Mann–Whitney test",
+        p: p.min(1.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn assert_close(found: f64, expected: f64, within: f64) {
+        assert!((found - expected).abs() <= within, "{found} for {expected}");
+    }
+
+    #[test]
+    fn wilson_gives_the_published_intervals() {
+        // R: prop.test(x, n, correct = FALSE)
+        for (successes, of, low, high) in [
+            (0.0, 20.0, 0.0, 0.161_125),
+            (10.0, 20.0, 0.299_298, 0.700_702),
+            (81.0, 263.0, 0.255_288, 0.366_165),
+            (15.0, 148.0, 0.062_386, 0.160_538),
+        ] {
+            let interval = wilson(successes, of).unwrap();
+            assert_close(interval.low, low, 1e-4);
+            assert_close(interval.high, high, 1e-4);
+        }
+        assert_eq!(wilson(0.0, 0.0), None);
+    }
+
+    #[test]
+    fn fisher_gives_the_published_values() {
+        // Fisher's tea tasting, and R's documentation of the convictions of twins.
+        assert_close(fisher(&[3, 1], &[1, 3]).p, 0.485_714, 1e-6);
+        assert_close(fisher(&[2, 15], &[10, 3]).p, 0.000_536_7, 1e-7);
+        // By hand: 3 | 0 0 against 0 | 2 1; of the 20 tables' ways, those of 1 or fewer.
+        assert_close(fisher(&[3, 0, 0], &[0, 2, 1]).p, 0.1, 1e-9);
+        assert_eq!(fisher(&[4, 0], &[9, 0]).p, 1.0);
+        assert_eq!(fisher(&[0, 0], &[9, 1]).p, 1.0);
+    }
+
+    #[test]
+    fn drawn_tables_agree_with_all_tables() {
+        let (totals, row) = ([10, 12, 8, 6], 18);
+        let observed = [8, 6, 3, 1];
+        let ways: f64 = totals
+            .iter()
+            .zip(observed)
+            .map(|(&total, count)| ln_choose(total, count))
+            .sum();
+        assert_close(drawn(&totals, row, ways), exact(&totals, row, ways), 0.003);
+    }
+
+    #[test]
+    fn the_sign_test_is_the_binomial_test() {
+        // R: binom.test(9, 10), binom.test(5, 18)
+        assert_close(sign(9, 1).p, 0.021_484, 1e-6);
+        assert_close(sign(5, 13).p, 0.096_252, 1e-6);
+        assert_close(sign(0, 0).p, 1.0, 0.0);
+        assert_close(median_is(&[0.1, 0.2, 0.31, 0.9], 0.3, 0.02).p, 1.0, 1e-9);
+    }
+
+    #[test]
+    fn mann_whitney_gives_the_published_value() {
+        // R: wilcox.test(first, second, exact = FALSE)
+        let first = [0.80, 0.83, 1.89, 1.04, 1.45, 1.38, 1.91, 1.64, 0.73, 1.46];
+        let second = [1.15, 0.88, 0.90, 0.74, 1.21];
+        assert_close(mann_whitney(&first, &second).p, 0.2446, 1e-4);
+        assert_eq!(mann_whitney(&[1.0, 1.0], &[1.0]).p, 1.0);
+    }
+
+    #[test]
+    fn quantiles_lie_linearly_between_values() {
+        let values = [1.0, 2.0, 4.0];
+        let found = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| quantile(&values, share));
+        assert_eq!(found, [1.0, 1.5, 2.0, 3.0, 4.0]);
+    }
+
+    #[test]
+    fn a_medians_interval_holds_it_and_is_the_same_every_time() {
+        let values: Vec<f64> = (0..41).map(f64::from).collect();
+        let interval = median_interval(&values).unwrap();
+        assert_eq!(median_interval(&values), Some(interval));
+        // Order statistics 14 and 28 of 41 have a coverage of 95.6 %.
+        assert_close(interval.low, 13.0, 1.5);
+        assert_close(interval.high, 27.0, 1.5);
+        assert_eq!(median_interval(&[]), None);
+    }
+}

@@ -1,0 +1,735 @@
+//! The paper's tables with our numbers, the paper's, intervals and tests.
+
+use super::gather::{Gathered, Group, Reevaluated, Resilient, Run, structure_named};
+use super::paper::{
+    Distribution, GROUPING, MeanMedian, NONE, Of, PaperValues, StructureValues, is_grouping,
+};
+use super::statistics::{Interval, Test, fisher, median_interval, median_is, wilson};
+use crate::reevaluation::{mean, median};
+use minimal_surprise_controller::{Prediction, Template};
+use minimal_surprise_sim::structures::{LineOrientation, Structure};
+use serde::Serialize;
+
+/// Name of the measure that the paper gives for most settings.
+pub const MEDIAN_BEST_FITNESS: &str = "median best fitness";
+
+/// A number of ours beside the paper's.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Value {
+    /// Row and what it is made of.
+    pub setting: String,
+    /// Column.
+    pub what: String,
+    /// Runs, genomes or repetitions that it is of.
+    pub of: usize,
+    /// Our number.
+    pub ours: Option<f64>,
+    /// Our median, where the number is a mean.
+    pub ours_median: Option<f64>,
+    /// Lower end of the 95 % interval.
+    pub low: Option<f64>,
+    /// Upper end.
+    pub high: Option<f64>,
+    /// The paper's number.
+    pub paper: Option<f64>,
+    /// The paper's median, where the number is a mean.
+    pub paper_median: Option<f64>,
+    /// The test of whether both may be the same.
+    pub test: Option<&'static str>,
+    /// Its p-value.
+    pub p: Option<f64>,
+    /// Whether it does not speak against it.
+    pub compatible: Option<bool>,
+    /// Digits after the point, for showing.
+    #[serde(skip)]
+    pub digits: usize,
+}
+
+impl Value {
+    fn new(setting: &str, what: &str) -> Self {
+        Self {
+            setting: setting.to_owned(),
+            what: what.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    fn within(mut self, interval: Option<Interval>, scale: f64) -> Self {
+        self.low = interval.map(|interval| scale * interval.low);
+        self.high = interval.map(|interval| scale * interval.high);
+        self
+    }
+
+    fn tested(mut self, test: Test) -> Self {
+        self.test = Some(test.name);
+        self.p = Some(test.p);
+        self.compatible = Some(test.compatible());
+        self
+    }
+}
+
+/// A row of a table.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The setting.
+    pub name: String,
+    /// How many of its runs there are.
+    pub counted: String,
+    /// Its numbers, one a column; none where there is nothing to say.
+    pub values: Vec<Option<Value>>,
+}
+
+/// A table.
+#[derive(Clone, Debug)]
+pub struct Table {
+    /// Name of its file.
+    pub id: String,
+    /// Table or section of the paper; empty if there is none.
+    pub source: String,
+    /// What it shows.
+    pub title: String,
+    /// How to read it.
+    pub notes: Vec<String>,
+    /// Columns.
+    pub columns: Vec<String>,
+    /// Rows.
+    pub rows: Vec<Row>,
+}
+
+impl Table {
+    /// Every number.
+    pub fn values(&self) -> impl Iterator<Item = &Value> {
+        self.rows.iter().flat_map(|row| row.values.iter().flatten())
+    }
+}
+
+/// What the tables' shares of runs are of: each run's categories, several if tied.
+struct Shared<'a> {
+    name: String,
+    setting: String,
+    counted: String,
+    runs: Vec<Vec<String>>,
+    paper: Option<&'a Distribution>,
+}
+
+impl Shared<'_> {
+    /// Whether a category is one of these: the groupings are told apart or are not.
+    fn has(&self, category: &str) -> bool {
+        let together = self.paper.is_some_and(|d| d.percent.contains_key(GROUPING));
+        if category == GROUPING {
+            together
+        } else {
+            !(together && structure_named(category).is_some_and(is_grouping))
+        }
+    }
+}
+
+/// All tables.
+#[must_use]
+pub fn all(gathered: &Gathered, paper: &PaperValues) -> Vec<Table> {
+    let mut tables = Vec::new();
+    for experiment in gathered.experiments() {
+        let groups: Vec<&Group> = gathered
+            .groups
+            .iter()
+            .filter(|group| group.experiment == experiment)
+            .collect();
+        tables.extend(structure_tables(experiment, &groups, gathered, paper));
+        for group in &groups {
+            tables.extend(per_structure(group, paper));
+        }
+        tables.extend(numbers(experiment, &groups, paper));
+    }
+    tables.extend(orientations(gathered, paper));
+    tables.extend(gathered.resiliences.iter().map(|r| resilience(r, paper)));
+    tables
+}
+
+/// Structures that runs are named after: a table for each of the paper's, and one for settings
+/// that it does not have.
+fn structure_tables(
+    experiment: &str,
+    groups: &[&Group],
+    gathered: &Gathered,
+    paper: &PaperValues,
+) -> Vec<Table> {
+    let of_paper =
+        |group: &Group| paper.distribution(Of::Structures, &group.experiment, &group.label);
+    let mut sources: Vec<String> = Vec::new();
+    for group in groups {
+        let source = of_paper(group).map_or(String::new(), |d| d.source.clone());
+        if !sources.contains(&source) {
+            sources.push(source);
+        }
+    }
+    let tables = sources.into_iter().map(|source| {
+        let repeated = gathered.groups.iter().filter(|group| {
+            of_paper(group).is_some_and(|d| d.also.is_some() && d.also.as_ref() == Some(&source))
+        });
+        let own = groups
+            .iter()
+            .copied()
+            .filter(|group| of_paper(group).map_or(String::new(), |d| d.source.clone()) == source);
+        let shared: Vec<Shared<'_>> = repeated
+            .chain(own)
+            .map(|group| Shared {
+                name: group.label.clone(),
+                setting: format!("{}: {}", group.experiment, group.label),
+                counted: group.counted(),
+                runs: structure_categories(group, of_paper(group)),
+                paper: of_paper(group),
+            })
+            .collect();
+        let id = if source.is_empty() {
+            format!("structures-{experiment}")
+        } else if source.starts_with("Table") {
+            file_name(&source)
+        } else {
+            format!("{}-{experiment}", file_name(&source))
+        };
+        let title =
+            format!("{experiment}: percentage of runs by the structure they are named after");
+        let categories = structure_order(&shared);
+        share_table(id, source, title, &shared, &categories)
+    });
+    tables.collect()
+}
+
+fn file_name(source: &str) -> String {
+    source.to_lowercase().replace(". ", "-").replace(' ', "-")
+}
+
+/// The categories of every run; the groupings together if the paper has them so.
+fn structure_categories(group: &Group, paper: Option<&Distribution>) -> Vec<Vec<String>> {
+    let together = paper.is_some_and(|d| d.percent.contains_key(GROUPING));
+    let name = |structure: &Structure| {
+        if together && is_grouping(*structure) {
+            GROUPING.to_owned()
+        } else {
+            structure.name().to_owned()
+        }
+    };
+    group
+        .runs
+        .iter()
+        .map(|run| match run.names.as_slice() {
+            [] => vec![NONE.to_owned()],
+            names => names.iter().map(name).collect(),
+        })
+        .collect()
+}
+
+/// The structures that come up, in the paper's order.
+fn structure_order(shared: &[Shared<'_>]) -> Vec<String> {
+    let names = Structure::ALL.iter().map(|s| s.name());
+    let mut order: Vec<String> = names.map(str::to_owned).collect();
+    order.insert(2, GROUPING.to_owned());
+    order.push(NONE.to_owned());
+    order.retain(|name| {
+        shared.iter().any(|shared| {
+            shared
+                .runs
+                .iter()
+                .flatten()
+                .any(|category| category == name)
+                || shared.paper.is_some_and(|d| d.percent.contains_key(name))
+        })
+    });
+    order
+}
+
+fn share_table(
+    id: String,
+    source: String,
+    title: String,
+    shared: &[Shared<'_>],
+    categories: &[String],
+) -> Table {
+    let tested = shared.iter().any(|shared| shared.paper.is_some());
+    let rows = shared.iter().map(|shared| {
+        let mut values: Vec<Option<Value>> = categories
+            .iter()
+            .map(|category| shared.has(category).then(|| share(shared, category)))
+            .collect();
+        if tested {
+            values.push(distribution_test(shared, categories));
+        }
+        Row {
+            name: shared.name.clone(),
+            counted: shared.counted.clone(),
+            values,
+        }
+    });
+    let mut columns = categories.to_vec();
+    let mut notes = vec![
+        "Percent with Wilson's 95 % interval; a run tied between k structures counts 1/k for each."
+            .to_owned(),
+    ];
+    if tested {
+        columns.push("all together".to_owned());
+        notes.push(
+            "All together: test of both distributions; there a tied run counts for the structure \
+             that comes first in the paper's Sec. 2.2."
+                .to_owned(),
+        );
+    }
+    notes.extend(
+        shared.iter().filter_map(|shared| {
+            Some(format!("{}: {}", shared.name, shared.paper?.note.as_ref()?))
+        }),
+    );
+    Table {
+        id,
+        source,
+        title,
+        notes,
+        columns,
+        rows: rows.collect(),
+    }
+}
+
+/// Share of runs in a category, in percent.
+fn share(shared: &Shared<'_>, category: &str) -> Value {
+    let count: f64 = shared
+        .runs
+        .iter()
+        .map(|run| {
+            let tied = run.iter().filter(|name| *name == category).count();
+            tied as f64 / run.len() as f64
+        })
+        .sum();
+    let of = shared.runs.len();
+    Value {
+        of,
+        ours: (of > 0).then(|| 100.0 * count / of as f64),
+        paper: shared.paper.map(|d| d.percent(category)),
+        digits: 1,
+        ..Value::new(&shared.setting, category)
+    }
+    .within(wilson(count, of as f64), 100.0)
+}
+
+/// Our distribution against the paper's.
+fn distribution_test(shared: &Shared<'_>, categories: &[String]) -> Option<Value> {
+    let paper = shared.paper?;
+    let value = Value {
+        of: shared.runs.len(),
+        ..Value::new(&shared.setting, "all together")
+    };
+    if shared.runs.is_empty() {
+        return Some(value);
+    }
+    let ours: Vec<u32> = categories
+        .iter()
+        .map(|category| {
+            let first = shared
+                .runs
+                .iter()
+                .filter(|run| run.first() == Some(category));
+            first.count() as u32
+        })
+        .collect();
+    Some(value.tested(fisher(&ours, &paper.runs(categories))))
+}
+
+/// A median against the paper's.
+fn median_value(setting: &str, what: &str, values: &[f64], digits: usize) -> Value {
+    Value {
+        of: values.len(),
+        ours: (!values.is_empty()).then(|| median(values)),
+        digits,
+        ..Value::new(setting, what)
+    }
+    .within(median_interval(values), 1.0)
+}
+
+/// Tables 4 and 5 below their first row: what the runs of each structure are like.
+fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table> {
+    let of_paper = |structure: Structure| {
+        paper.structures.iter().find(|values| {
+            values.experiment == group.experiment
+                && values.setting == group.label
+                && values.structure == structure.name()
+        })
+    };
+    let source = Structure::ALL
+        .into_iter()
+        .find_map(of_paper)?
+        .source
+        .clone();
+    let present: Vec<Structure> = Structure::ALL
+        .into_iter()
+        .filter(|s| of_paper(*s).is_some() || group.runs.iter().any(|run| run.names.contains(s)))
+        .collect();
+    type Ours = fn(&Run, Structure) -> f64;
+    type Theirs = fn(&StructureValues) -> MeanMedian;
+    let measures: [(&str, usize, f64, Ours, Theirs); 4] = [
+        (
+            "robots in the structure, %",
+            1,
+            0.5,
+            |run, structure| 100.0 * run.share(structure),
+            |v| v.robots_percent,
+        ),
+        (
+            "fitness F",
+            3,
+            0.0005,
+            |run, _| run.fitness(),
+            |v| v.fitness,
+        ),
+        (
+            "movement M",
+            3,
+            0.0005,
+            |run, _| run.movement,
+            |v| v.movement,
+        ),
+        (
+            "intended movement I",
+            3,
+            0.0005,
+            |run, _| run.intended_movement,
+            |v| v.intended_movement,
+        ),
+    ];
+    let rows = measures.map(|(what, digits, rounding, ours, theirs)| Row {
+        name: what.to_owned(),
+        counted: String::new(),
+        values: present
+            .iter()
+            .map(|&structure| {
+                let named = group
+                    .runs
+                    .iter()
+                    .filter(|run| run.names.contains(&structure));
+                let values: Vec<f64> = named.map(|run| ours(run, structure)).collect();
+                let paper = of_paper(structure).map(theirs);
+                let mut value = Value {
+                    of: values.len(),
+                    ours: (!values.is_empty()).then(|| mean(&values)),
+                    ours_median: (!values.is_empty()).then(|| median(&values)),
+                    paper: paper.map(|p| p.mean),
+                    paper_median: paper.and_then(|p| p.median),
+                    digits,
+                    ..Value::new(what, structure.name())
+                }
+                .within(median_interval(&values), 1.0);
+                if let Some(median) = paper.and_then(|p| p.median)
+                    && !values.is_empty()
+                {
+                    value = value.tested(median_is(&values, median, rounding));
+                }
+                Some(value)
+            })
+            .collect(),
+    });
+    Some(Table {
+        id: format!("{}-by-structure", file_name(&source)),
+        source,
+        title: format!(
+            "{}, {}: what the runs of each structure are like",
+            group.experiment, group.label
+        ),
+        notes: vec![
+            "Mean, and median in brackets with its bootstrap 95 % interval; sign test against the \
+             paper's median, which cannot tell anything from fewer than six runs."
+                .to_owned(),
+        ],
+        columns: present.iter().map(|s| s.name().to_owned()).collect(),
+        rows: rows.to_vec(),
+    })
+}
+
+/// Numbers that the paper gives in its text, and the median best fitness of every setting.
+fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<Table> {
+    type Values = fn(&Group) -> Vec<f64>;
+    let medians: [(&str, usize, Values); 3] = [
+        (MEDIAN_BEST_FITNESS, 3, |g| g.values(Run::fitness)),
+        ("median share in the structure, %", 1, |g| {
+            g.values(|run| 100.0 * run.named_share())
+        }),
+        ("median temperature in the last step", 3, |g| {
+            g.values(|run| run.temperature.last().copied().unwrap_or(0.0))
+        }),
+    ];
+    type Counted = fn(&Run) -> bool;
+    let line_runs: Counted = |run| run.names.contains(&Structure::Line);
+    let shares: [(&str, Counted); 2] = [
+        ("line runs with lines around the torus, %", line_runs),
+        ("runs with lines around the torus, %", |_| true),
+    ];
+    let wanted = |measure: &str| {
+        measure == MEDIAN_BEST_FITNESS
+            || groups
+                .iter()
+                .any(|g| paper.number(experiment, &g.label, measure).is_some())
+    };
+    let mut columns = Vec::new();
+    let mut rows: Vec<Row> = groups
+        .iter()
+        .map(|group| Row {
+            name: group.label.clone(),
+            counted: group.counted(),
+            values: Vec::new(),
+        })
+        .collect();
+    for (measure, digits, values) in medians.into_iter().filter(|(m, ..)| wanted(m)) {
+        columns.push(measure.to_owned());
+        for (row, group) in rows.iter_mut().zip(groups) {
+            let values = values(group);
+            let setting = format!("{experiment}: {}", group.label);
+            let mut value = median_value(&setting, measure, &values, digits);
+            if let Some(number) = paper.number(experiment, &group.label, measure) {
+                value.paper = Some(number.value);
+                if !values.is_empty() {
+                    let rounding = number.last_digit / 2.0;
+                    value = value.tested(median_is(&values, number.value, rounding));
+                }
+            }
+            row.values.push(Some(value));
+        }
+    }
+    for (measure, counted) in shares.into_iter().filter(|(m, _)| wanted(m)) {
+        columns.push(measure.to_owned());
+        for (row, group) in rows.iter_mut().zip(groups) {
+            let runs: Vec<&Run> = group.runs.iter().filter(|run| counted(run)).collect();
+            let spanning = runs.iter().filter(|run| run.lines.spanning > 0).count();
+            let of = runs.len();
+            let mut value = Value {
+                of,
+                ours: (of > 0).then(|| 100.0 * spanning as f64 / of as f64),
+                digits: 1,
+                ..Value::new(&format!("{experiment}: {}", group.label), measure)
+            }
+            .within(wilson(spanning as f64, of as f64), 100.0);
+            if let Some(number) = paper.number(experiment, &group.label, measure) {
+                value.paper = Some(number.value);
+                let shares = paper.distribution(Of::Structures, experiment, &group.label);
+                if let Some(shares) = shares
+                    && of > 0
+                {
+                    // The paper's runs that the share is of: its line runs, or all.
+                    let lines = shares.percent(Structure::Line.name()) / 100.0;
+                    let runs = f64::from(shares.runs);
+                    let among = if measure.starts_with("line") {
+                        (lines * runs).round()
+                    } else {
+                        runs
+                    };
+                    let theirs = (number.value / 100.0 * among).round() as u32;
+                    value = value.tested(fisher(
+                        &[spanning as u32, (of - spanning) as u32],
+                        &[theirs, among as u32 - theirs],
+                    ));
+                }
+            }
+            row.values.push(Some(value));
+        }
+    }
+    if groups.is_empty() {
+        return None;
+    }
+    let mut sources: Vec<&str> = groups
+        .iter()
+        .flat_map(|g| {
+            paper
+                .numbers
+                .iter()
+                .filter(move |n| n.experiment == experiment && n.setting == g.label)
+        })
+        .map(|number| number.source.as_str())
+        .collect();
+    sources.dedup();
+    Some(Table {
+        id: format!("numbers-{experiment}"),
+        source: sources.join(", "),
+        title: format!("{experiment}: fitness and other numbers"),
+        notes: vec![
+            "Medians with bootstrap 95 % interval and sign test against the paper's median, the \
+             printed number being taken as exact to half its last digit; percentages with Wilson's \
+             interval and Fisher's test."
+                .to_owned(),
+        ],
+        columns,
+        rows,
+    })
+}
+
+/// Table 6: which way the lines go, in the runs and from new starts.
+fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
+    let is_line = |group: &&Group| {
+        group.settings.topology.prediction() == Prediction::Predefined(Template::Line)
+    };
+    let mut shared = Vec::new();
+    for group in gathered.groups.iter().filter(is_line) {
+        let key = (group.experiment.as_str(), group.label.as_str());
+        let of_run = |run: &Run| {
+            let name = run.lines.orientation().map_or(NONE, LineOrientation::name);
+            vec![name.to_owned()]
+        };
+        shared.push(Shared {
+            name: format!("{}: as evolved", group.label),
+            setting: format!("{}: {}, as evolved", key.0, key.1),
+            counted: group.counted(),
+            runs: group.runs.iter().map(of_run).collect(),
+            paper: paper.distribution(Of::Orientation, key.0, key.1),
+        });
+        let again = |r: &&Reevaluated| r.experiment == key.0 && r.label == key.1;
+        for reevaluated in gathered.reevaluations.iter().filter(again) {
+            let of_genome = |orientation: Option<LineOrientation>| {
+                let name = orientation.map_or("diverse", LineOrientation::name);
+                vec![name.to_owned()]
+            };
+            let orientations = reevaluated.orientations();
+            shared.push(Shared {
+                name: format!("{}: {} new starts", group.label, reevaluated.starts),
+                setting: format!("{}: {}, new starts", key.0, key.1),
+                counted: group.counted(),
+                runs: orientations.into_iter().map(of_genome).collect(),
+                paper: paper.distribution(Of::NewStarts, key.0, key.1),
+            });
+        }
+    }
+    if shared.is_empty() {
+        return None;
+    }
+    let source = shared
+        .iter()
+        .find_map(|s| s.paper)
+        .map_or(String::new(), |d| d.source.clone());
+    let mut categories: Vec<String> = [
+        "mostly vertical",
+        "mostly horizontal",
+        "maze-like",
+        "diverse",
+        NONE,
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    categories.retain(|c| {
+        c != NONE
+            || shared
+                .iter()
+                .any(|s| s.runs.iter().flatten().any(|r| r == c))
+    });
+    let id = if source.is_empty() {
+        "orientations".to_owned()
+    } else {
+        file_name(&source)
+    };
+    let title =
+        "Percentage of runs, and of genomes from new starts, by the way their lines go".to_owned();
+    let mut table = share_table(id, source, title, &shared, &categories);
+    table.notes[0] =
+        "Percent with Wilson's 95 % interval. From new starts a genome counts for what \
+                      more than half of them give, else as diverse."
+            .to_owned();
+    table.notes.retain(|note| !note.starts_with("All together"));
+    for reevaluated in &gathered.reevaluations {
+        let all: Vec<&[Structure]> = reevaluated
+            .genomes
+            .iter()
+            .flatten()
+            .map(|start| start.names.as_slice())
+            .collect();
+        let other = all
+            .iter()
+            .filter(|names| names.first() != Some(&Structure::Line));
+        table.notes.push(format!(
+            "{}: {} of {} new starts ended in something other than lines.",
+            reevaluated.label,
+            other.count(),
+            all.len()
+        ));
+    }
+    Some(table)
+}
+
+/// Tables 7 and 8.
+fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
+    let name = &resilient.asked.name;
+    let of_paper: Vec<_> = paper
+        .damages
+        .iter()
+        .filter(|d| d.resilience == *name)
+        .collect();
+    let source = of_paper.first().map_or(String::new(), |d| d.source.clone());
+    let columns = [
+        "fitness",
+        "in the structure at the start, %",
+        "in the structure at the end, %",
+        "similarity",
+    ];
+    let mut notes = vec![format!(
+        "{} of {} runs of {} looked through are named after the structure ({}).",
+        resilient.named, resilient.looked_through, resilient.asked.of, resilient.structure
+    )];
+    let mut rows = Vec::new();
+    if let Some(damaged) = &resilient.damaged {
+        notes.push(format!(
+            "Of these the one with the largest share was damaged: {}, seed {}. Means, medians in \
+             brackets. It is another genome than the paper's, so that the numbers need not be the \
+             same and are not tested.",
+            damaged.label, damaged.run.finished.settings.seed
+        ));
+        for area in &damaged.areas {
+            let r = area.rectangle;
+            notes.push(format!(
+                "Area {}: cells {} to {} from the west, {} to {} from the south.",
+                area.name, r.x0, r.x1, r.y0, r.y1
+            ));
+        }
+        for (row_name, row) in damaged.rows() {
+            let theirs = of_paper.iter().find(|values| values.row == row_name);
+            let percent = |values: &[f64]| values.iter().map(|v| 100.0 * v).collect::<Vec<_>>();
+            let columns_values = [
+                (row.fitness.clone(), theirs.map(|v| v.fitness), 3),
+                (
+                    percent(&row.share_start),
+                    theirs.map(|v| v.start_percent),
+                    1,
+                ),
+                (percent(&row.share_end), theirs.map(|v| v.end_percent), 1),
+                (row.similarity.clone(), theirs.map(|v| v.similarity), 3),
+            ];
+            let values =
+                columns
+                    .iter()
+                    .zip(columns_values)
+                    .map(|(what, (values, theirs, digits))| {
+                        Some(Value {
+                            of: values.len(),
+                            ours: Some(mean(&values)),
+                            ours_median: (values.len() > 1).then(|| median(&values)),
+                            paper: theirs.map(|t| t.mean),
+                            paper_median: theirs.and_then(|t| t.median),
+                            digits,
+                            ..Value::new(&row_name, what)
+                        })
+                    });
+            rows.push(Row {
+                values: values.collect(),
+                counted: match row.fitness.len() {
+                    1 => "1 run".to_owned(),
+                    more => format!("{more} runs"),
+                },
+                name: row_name,
+            });
+        }
+    } else {
+        notes.push("There is none to damage yet; more runs are needed.".to_owned());
+    }
+    Table {
+        id: if source.is_empty() {
+            name.clone()
+        } else {
+            file_name(&source)
+        },
+        source,
+        title: format!("{name}: what becomes of a damaged {}", resilient.structure),
+        notes,
+        columns: columns.map(str::to_owned).to_vec(),
+        rows,
+    }
+}
