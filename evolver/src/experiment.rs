@@ -1,16 +1,16 @@
 //! An experiment: evolution and world together, a generation at a time.
 
 use crate::evolution::{Population, best_slot};
+use crate::generation_work::Work;
 use crate::run_hash::RunHash;
 use crate::settings::Settings;
 use minimal_surprise_controller::{Controller, Genome, Provenance};
-use minimal_surprise_sim::evaluation::{Evaluation, Outcome, run};
+use minimal_surprise_sim::evaluation::{Outcome, run};
 use minimal_surprise_sim::metrics::Measures;
 use minimal_surprise_sim::structures::{Structures, classify};
-use minimal_surprise_sim::{Engine, Evaluator, Path, Pose, SeedTree, Trial, TrialSet, WorldError};
-use rayon::prelude::*;
+use minimal_surprise_sim::{Engine, Evaluator, Path, Pose, SeedTree, Trial, WorldError};
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// What a generation came to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -137,26 +137,19 @@ impl Experiment {
         let trials: Vec<Trial> = (0..self.settings.repetitions)
             .map(|repetition| scenario.trial(seeds, generation, repetition))
             .collect();
-        let trials = TrialSet::new(*scenario, self.settings.topology.model(), trials);
-        let evaluations: Option<Vec<Evaluation>> = self
-            .population
-            .ask()
-            .par_iter()
-            .with_max_len(1)
-            .map_init(
-                || Evaluator::new(engine, path),
-                |evaluator, genome| {
-                    (!stop.load(Ordering::Relaxed)).then(|| evaluator.evaluate(genome, &trials))
-                },
-            )
-            .collect();
-        let evaluations = evaluations?;
+        let work = Work::new(
+            scenario,
+            self.settings.topology,
+            trials,
+            self.population.ask(),
+        );
+        let evaluations = work.evaluate(engine, path, stop)?;
         let matches: Vec<u64> = evaluations.iter().map(|e| e.matches).collect();
         let best = best_slot(&matches);
         let worst_repetition = evaluations[best].worst_repetition;
         let (motion, poses) = Evaluator::new(Engine::Fast, path).motion(
             &self.population.ask()[best],
-            &trials,
+            work.trials(),
             worst_repetition,
         );
         let found = classify(scenario.grid(), &poses).expect("a world keeps its robots apart");

@@ -17,6 +17,7 @@ pub mod evolving;
 pub mod experiment;
 pub mod files;
 pub mod finished_run;
+pub mod generation_work;
 pub mod hil;
 pub mod reevaluation;
 pub mod report;
