@@ -15,13 +15,14 @@ use std::process::ExitCode;
 
 /// What to run, and where the robot is.
 #[derive(Debug, Args)]
+#[command(override_usage = "evolver hil [OPTIONS] <--port <PORT>|--simulate> <RUN>")]
 pub struct HilArgs {
     /// A run directory, which says everything about the run; or a genome file.
     run: PathBuf,
     #[command(flatten)]
     port: Option<PortArgs>,
     /// Only simulate, without a robot.
-    #[arg(long, required_unless_present = "port", conflicts_with = "PortArgs")]
+    #[arg(long, required_unless_present = "port", conflicts_with = "port")]
     simulate: bool,
     /// For a genome: width and height of the torus, in cells [default: 15x15].
     #[arg(long, value_name = "WxH", allow_hyphen_values = true)]
