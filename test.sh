@@ -78,7 +78,9 @@ if [ $clippy = 1 ]; then
         echo 'test.sh: clippy has no core library for the target: only the portable part of the firmware'
         cargo clippy --locked --manifest-path firmware-example/Cargo.toml --lib -- -D warnings
     else
-        (cd firmware-example && ../scripts/thumb-cargo.sh clippy --locked -- -D warnings)
+        (cd firmware-example &&
+            ../scripts/thumb-cargo.sh clippy --locked -- -D warnings &&
+            ../scripts/thumb-cargo.sh clippy --locked --package probe -- -D warnings)
     fi
 fi
 

@@ -45,7 +45,7 @@ const TAIL: i32 = 4095 << 3;
 /// does not fit; only 0 and −32768 have such a t, and they need none.) With −t, its row gives the
 /// negative of the first result, then the second as it is, then the negative of the third; its
 /// constants hold the d − 1 of ⌊(d − 1 − a) / d⌋ = −⌊a / d⌋.
-static ROWS: [[i32; 4]; 32] = {
+pub(crate) static ROWS: [[i32; 4]; 32] = {
     let mut rows = [[0; 4]; 32];
     let mut segment = 0;
     while segment < 16 {

@@ -2,7 +2,7 @@
 
 use crate::codec::EncodedGenome;
 use crate::genome::Genome;
-use crate::network::{ActionNetwork, MAX_HIDDEN, PredictionNetwork};
+use crate::network::{ActionNetwork, Aligned, MAX_HIDDEN, PredictionNetwork};
 use crate::sensor::SensorBits;
 use crate::topology::Topology;
 use serde::{Deserialize, Serialize};
@@ -54,7 +54,7 @@ pub struct Controller {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct State {
-    hidden_q3_12: [i16; MAX_HIDDEN],
+    hidden_q3_12: Aligned<[i16; MAX_HIDDEN]>,
     last_action: Action,
     prediction: SensorBits,
     surprise: Surprise,
@@ -103,7 +103,8 @@ impl Controller {
         Self::build(topology, &mut core::iter::empty())
     }
 
-    fn build(topology: Topology, weights: &mut impl Iterator<Item = i16>) -> Self {
+    #[inline(never)]
+    fn build(topology: Topology, weights: &mut dyn Iterator<Item = i16>) -> Self {
         Self {
             topology,
             action: ActionNetwork::from_weights(topology.action_shape(), weights),
@@ -117,7 +118,9 @@ impl Controller {
     /// the last one as an input, and predicts the next reading with the action just chosen.
     ///
     /// Bits beyond the model's sensors are ignored. Cannot fail, panic or allocate.
-    #[inline]
+    // One copy, in this crate: a firmware may optimise this crate for speed and the rest for size.
+    #[cfg_attr(has_smlad, inline(never))]
+    #[cfg_attr(not(has_smlad), inline)]
     pub fn step(&self, state: &mut State, sensors: SensorBits) -> Decision {
         let (action, turn) = self.decide(sensors, state.last_action);
         let prediction = self.predict(state, sensors, action);
@@ -134,7 +137,7 @@ impl Controller {
     pub fn decide(&self, sensors: SensorBits, last_action: Action) -> (Action, Turn) {
         let outputs = self
             .action
-            .forward(self.inputs(sensors, last_action), &mut [0; 8]);
+            .forward(self.inputs(sensors, last_action), &mut Aligned([0; 8]));
         let action = if outputs & 1 == 0 {
             Action::Straight
         } else {
@@ -216,7 +219,7 @@ impl State {
     #[must_use]
     pub fn new(controller: &Controller) -> Self {
         Self {
-            hidden_q3_12: [0; MAX_HIDDEN],
+            hidden_q3_12: Aligned([0; MAX_HIDDEN]),
             last_action: Action::Straight,
             prediction: controller.topology.fixed(),
             surprise: Surprise::default(),
@@ -238,7 +241,7 @@ impl State {
     /// The prediction network's hidden activations, Q3.12; zero beyond its neurons.
     #[must_use]
     pub fn hidden_q3_12(&self) -> &[i16; MAX_HIDDEN] {
-        &self.hidden_q3_12
+        &self.hidden_q3_12.0
     }
 
     /// Surprise since the start, the number that a robot reports.

@@ -8,9 +8,53 @@
 //! the portable code to the bit (test `parity`).
 #![allow(unsafe_code)]
 
+use crate::activation::{ROWS, SEGMENT_SCALE};
 use crate::fixed::{FRACTION_BITS, MAX_TERMS, ROUNDING_Q24};
 use crate::network::Aligned;
 use core::arch::asm;
+
+/// Makes the first `count` values their activations: [`activate`](crate::activate), in its order.
+#[inline]
+pub(crate) fn activate_all<const N: usize>(values: &mut [i16; N], count: usize) {
+    const { assert!(SEGMENT_SCALE == 15 << 1) };
+    let count = count.min(N);
+    if count == 0 {
+        return;
+    }
+    // SAFETY: reads and writes `count` values, no more than there are, and reads one of the 32 rows
+    // of `ROWS` for each; an `i32` starts at a word, as `ldm` wants it. The flags and the registers
+    // used are declared.
+    unsafe {
+        asm!(
+            "2:",
+            "ldrsh {x}, [{value}]",
+            "rsb {x}, {x}, {x}, lsl #4",
+            "lsls {x}, {x}, #1",
+            "ubfx r0, {x}, #16, #5",
+            "add r0, {rows}, r0, lsl #4",
+            "ldm r0, {{r0, r1, r2, r3}}",
+            "eor {x}, {x}, #0x8000",
+            "sxth {x}, {x}",
+            "mla r0, r0, {x}, r1",
+            "smultb r0, r0, {x}",
+            "add r0, r2, r0, asr #16",
+            "mla r0, r0, {x}, r3",
+            "asrs r0, r0, #19",
+            "strh r0, [{value}], #2",
+            "subs {count}, #1",
+            "bne 2b",
+            x = out(reg) _,
+            rows = in(reg) ROWS.as_ptr(),
+            value = inout(reg) values.as_mut_ptr() => _,
+            count = inout(reg) count => _,
+            out("r0") _,
+            out("r1") _,
+            out("r2") _,
+            out("r3") _,
+            options(nostack),
+        );
+    }
+}
 
 /// Terms of the sums that [`output_signs`] makes.
 pub(crate) const OUTPUT_TERMS: usize = 14;
@@ -132,4 +176,84 @@ pub(crate) fn output_signs<const N: usize, const O: usize>(
         );
     }
     ((!negative).reverse_bits() >> (32 - count as u32)) as u16
+}
+
+/// Terms of the sums that [`action_signs`] makes.
+pub(crate) const ACTION_TERMS: usize = 8;
+
+/// [`output_signs`] for rows of [`ACTION_TERMS`] terms, which stay in registers.
+///
+/// # Panics
+/// Unless a row has as many; known when this is compiled.
+#[inline]
+pub(crate) fn action_signs<const N: usize, const O: usize>(
+    rows: &Aligned<[[i16; N]; O]>,
+    terms: &Aligned<[i16; N]>,
+    count: usize,
+) -> u16 {
+    assert!(N == ACTION_TERMS);
+    let count = count.min(O).min(16);
+    if count == 0 {
+        return 0;
+    }
+    let negative: u32;
+    // SAFETY: reads `count` rows of four words and the four words of `terms`; no more than there
+    // are. All start at words, as `ldm` wants it. The flags and the registers used are declared.
+    unsafe {
+        asm!(
+            "ldm r0, {{r0, r1, r2, r3}}",
+            "2:",
+            "ldm {row}!, {{r4, r5, r8, r9}}",
+            "smuad {sum}, r0, r4",
+            "smlad {sum}, r1, r5, {sum}",
+            "smlad {sum}, r2, r8, {sum}",
+            "smlad {sum}, r3, r9, {sum}",
+            "lsls {sum}, {sum}, #1",
+            "adcs {negative}, {negative}, {negative}",
+            "subs {count}, #1",
+            "bne 2b",
+            sum = out(reg) _,
+            row = inout(reg) rows.0.as_ptr() => _,
+            negative = inout(reg) 0 => negative,
+            count = inout(reg) count => _,
+            inout("r0") terms.0.as_ptr() => _,
+            out("r1") _,
+            out("r2") _,
+            out("r3") _,
+            out("r4") _,
+            out("r5") _,
+            out("r8") _,
+            out("r9") _,
+            options(nostack, pure, readonly),
+        );
+    }
+    ((!negative).reverse_bits() >> (32 - count as u32)) as u16
+}
+
+/// Makes every pair of terms that of its two bits of `inputs`.
+#[inline]
+pub(crate) fn select_terms(
+    pairs: &Aligned<[[[i16; 2]; 4]; MAX_TERMS / 2]>,
+    inputs: u32,
+    terms: &mut Aligned<[i16; MAX_TERMS]>,
+) {
+    // SAFETY: reads one of the four words of each of the eight tables, and writes the eight words
+    // of `terms`. The flags and the registers used are declared.
+    unsafe {
+        asm!(
+            ".rept {words}",
+            "and {word}, {bits}, #3",
+            "ldr {word}, [{table}, {word}, lsl #2]",
+            "adds {table}, #16",
+            "lsrs {bits}, {bits}, #2",
+            "str {word}, [{terms}], #4",
+            ".endr",
+            words = const MAX_TERMS / 2,
+            word = out(reg) _,
+            bits = inout(reg) inputs => _,
+            table = inout(reg) pairs.0.as_ptr() => _,
+            terms = inout(reg) terms.0.as_mut_ptr() => _,
+            options(nostack),
+        );
+    }
 }

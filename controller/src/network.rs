@@ -156,15 +156,15 @@ impl Shape {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Network<const H: usize, const O: usize> {
     shape: Shape,
-    /// Activation of each input neuron for a bit of 0 and of 1.
-    input: [[i16; 2]; MAX_INPUTS],
+    /// Activations of two input neurons at a time, for each value of their two bits.
+    input: Aligned<[[[i16; 2]; 4]; MAX_TERMS / 2]>,
     /// Inputs' weights from 0 on, the self-loop at [`SELF_LOOP`].
     hidden: Aligned<[[i16; MAX_TERMS]; H]>,
     output: Aligned<[[i16; H]; O]>,
 }
 
 /// Starts at a word: several weights can be loaded at a time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C, align(4))]
 pub(crate) struct Aligned<T>(pub(crate) T);
@@ -179,35 +179,23 @@ impl<const H: usize, const O: usize> Network<H, O> {
 
     /// Takes the shape's weights, in genome order, from `weights`; weights that it does not
     /// deliver are zero, those beyond the shape stay in it. Neurons beyond `H` and `O` are left out.
-    pub(crate) fn from_weights(shape: Shape, weights: &mut impl Iterator<Item = i16>) -> Self {
+    pub(crate) fn from_weights(shape: Shape, weights: &mut dyn Iterator<Item = i16>) -> Self {
         let () = Self::TERMS_ARE_EXACT;
         let mut network = Self {
             shape,
-            input: [[0; 2]; MAX_INPUTS],
+            input: Aligned([[[0; 2]; 4]; MAX_TERMS / 2]),
             hidden: Aligned([[0; MAX_TERMS]; H]),
             output: Aligned([[0; H]; O]),
         };
-        for levels in network.input.iter_mut().take(shape.inputs()) {
-            let weight = i32::from(weights.next().unwrap_or(0));
-            let threshold = i32::from(weights.next().unwrap_or(0));
-            *levels = [
-                activate(saturate(-threshold)),
-                activate(saturate(weight - threshold)),
-            ];
-        }
-        for row in network.hidden.0.iter_mut().take(shape.hidden()) {
-            for weight in row.iter_mut().take(shape.inputs()) {
-                *weight = weights.next().unwrap_or(0);
-            }
-            if shape.recurrent() {
-                row[SELF_LOOP] = weights.next().unwrap_or(0);
-            }
-        }
-        for row in network.output.0.iter_mut().take(shape.outputs()) {
-            for weight in row.iter_mut().take(shape.hidden()) {
-                *weight = weights.next().unwrap_or(0);
-            }
-        }
+        let output = network.output.0.as_flattened_mut();
+        read_weights(
+            shape,
+            weights,
+            &mut network.input.0,
+            &mut network.hidden.0,
+            output,
+            H,
+        );
         network
     }
 
@@ -219,8 +207,11 @@ impl<const H: usize, const O: usize> Network<H, O> {
 
     /// Activations (Q3.12) of each input neuron for a bit of 0 and of 1; zero beyond the shape.
     #[must_use]
-    pub fn input_levels(&self) -> &[[i16; 2]; MAX_INPUTS] {
-        &self.input
+    pub fn input_levels(&self) -> [[i16; 2]; MAX_INPUTS] {
+        core::array::from_fn(|input| {
+            let pairs = &self.input.0[input / 2];
+            [0, 1].map(|bit| pairs[bit << (input % 2)][input % 2])
+        })
     }
 
     /// Hidden weights (Q3.12): a row a neuron, the self-loop at [`SELF_LOOP`]; zero beyond the
@@ -240,19 +231,67 @@ impl<const H: usize, const O: usize> Network<H, O> {
     /// is not negative. `hidden` holds the last hidden activations and receives the new ones;
     /// without self-loops only the latter.
     #[inline]
-    pub(crate) fn forward(&self, inputs: u32, hidden: &mut [i16; H]) -> u16 {
+    pub(crate) fn forward(&self, inputs: u32, hidden: &mut Aligned<[i16; H]>) -> u16 {
         let mut terms = Aligned([0; MAX_TERMS]);
-        for (index, (term, levels)) in terms.0.iter_mut().zip(&self.input).enumerate() {
-            *term = levels[(inputs >> index & 1) as usize];
-        }
-        let mut values = Aligned(*hidden);
+        select_terms(&self.input, inputs, &mut terms);
         let neurons = self.shape.hidden();
-        hidden_sums(&self.hidden, &mut terms, &mut values.0, neurons);
-        for value in values.0.iter_mut().take(neurons) {
-            *value = activate(*value);
+        hidden_sums(&self.hidden, &mut terms, &mut hidden.0, neurons);
+        activate_all(&mut hidden.0, neurons);
+        output_signs(&self.output, hidden, self.shape.outputs())
+    }
+}
+
+/// Fills the layers of a network, of whatever size: a robot's flash holds this once. An output row
+/// has `output_row` weights.
+#[inline(never)]
+fn read_weights(
+    shape: Shape,
+    weights: &mut dyn Iterator<Item = i16>,
+    input: &mut [[[i16; 2]; 4]; MAX_TERMS / 2],
+    hidden: &mut [[i16; MAX_TERMS]],
+    output: &mut [i16],
+    output_row: usize,
+) {
+    let mut next = || weights.next().unwrap_or(0);
+    for index in 0..shape.inputs().min(MAX_INPUTS) {
+        let weight = i32::from(next());
+        let threshold = i32::from(next());
+        let levels = [
+            activate(saturate(-threshold)),
+            activate(saturate(weight - threshold)),
+        ];
+        for (bits, pair) in input[index / 2].iter_mut().enumerate() {
+            pair[index % 2] = levels[bits >> (index % 2) & 1];
         }
-        *hidden = values.0;
-        output_signs(&self.output, &values, self.shape.outputs())
+    }
+    for row in hidden.iter_mut().take(shape.hidden()) {
+        for weight in row.iter_mut().take(shape.inputs()) {
+            *weight = next();
+        }
+        if shape.recurrent() {
+            row[SELF_LOOP] = next();
+        }
+    }
+    let rows = output.chunks_exact_mut(output_row.max(1));
+    for row in rows.take(shape.outputs()) {
+        for weight in row.iter_mut().take(shape.hidden()) {
+            *weight = next();
+        }
+    }
+}
+
+/// Makes every pair of terms that of its two bits of `inputs`.
+#[cfg(not(has_smlad))]
+#[inline]
+fn select_terms(
+    pairs: &Aligned<[[[i16; 2]; 4]; MAX_TERMS / 2]>,
+    inputs: u32,
+    terms: &mut Aligned<[i16; MAX_TERMS]>,
+) {
+    let mut bits = inputs as usize;
+    for (terms, pairs) in terms.0.as_chunks_mut().0.iter_mut().zip(&pairs.0) {
+        *terms = pairs[bits & 3];
+        bits >>= 2;
     }
 }
 
@@ -272,8 +311,17 @@ fn hidden_sums<const H: usize>(
     }
 }
 
+/// Makes the first `count` values their activations.
+#[cfg(not(has_smlad))]
+#[inline]
+fn activate_all<const H: usize>(values: &mut [i16; H], count: usize) {
+    for value in values.iter_mut().take(count) {
+        *value = activate(*value);
+    }
+}
+
 #[cfg(has_smlad)]
-use crate::dsp::hidden_sums;
+use crate::dsp::{activate_all, hidden_sums, select_terms};
 
 /// Sets bit k where the sum of row k's products with `terms` is not negative, for the first `count`
 /// rows.
@@ -286,6 +334,10 @@ fn output_signs<const H: usize, const O: usize>(
     #[cfg(has_smlad)]
     if H == crate::dsp::OUTPUT_TERMS {
         return crate::dsp::output_signs(rows, terms, count);
+    }
+    #[cfg(has_smlad)]
+    if H == crate::dsp::ACTION_TERMS {
+        return crate::dsp::action_signs(rows, terms, count);
     }
     let mut outputs = 0;
     for (index, row) in rows.0.iter().enumerate().take(count) {
@@ -341,21 +393,21 @@ mod tests {
         let u1 = activate(2048);
         assert_eq!(network.input_levels()[0], [-u1, u1]);
 
-        let mut hidden = [0];
+        let mut hidden = Aligned([0]);
         assert_eq!(network.forward(1, &mut hidden), 1);
         let first = activate(((8192 * i32::from(u1) + 2048) >> 12) as i16);
-        assert_eq!(hidden, [first]);
+        assert_eq!(hidden.0, [first]);
 
         assert_eq!(network.forward(0, &mut hidden), 0);
         let sum = -8192 * i32::from(u1) - 4096 * i32::from(first);
-        assert_eq!(hidden, [activate(((sum + 2048) >> 12) as i16)]);
+        assert_eq!(hidden.0, [activate(((sum + 2048) >> 12) as i16)]);
     }
 
     #[test]
     fn an_output_of_exactly_zero_counts_as_not_negative() {
         let shape = Shape::new(1, 1, 1, false).unwrap();
         let network = Network::<1, 1>::from_weights(shape, &mut core::iter::empty());
-        assert_eq!(network.forward(0, &mut [0]), 1);
+        assert_eq!(network.forward(0, &mut Aligned([0])), 1);
     }
 
     #[test]
@@ -364,9 +416,9 @@ mod tests {
         for weight in [32767, -32767] {
             let network: PredictionNetwork =
                 Network::from_weights(shape, &mut core::iter::repeat(weight));
-            let mut hidden = [4096; MAX_HIDDEN];
+            let mut hidden = Aligned([4096; MAX_HIDDEN]);
             network.forward(0x7fff, &mut hidden);
-            let mut hidden = [-4096; MAX_HIDDEN];
+            let mut hidden = Aligned([-4096; MAX_HIDDEN]);
             network.forward(0, &mut hidden);
         }
     }

@@ -11,7 +11,7 @@ use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 
 /// SysTick counts down from here.
-const RELOAD: u32 = 0x00ff_ffff;
+pub const RELOAD: u32 = 0x00ff_ffff;
 
 /// `nop`s of the calibration.
 const NOPS: u32 = 1000;
@@ -59,7 +59,9 @@ impl Counter {
         }
     }
 
-    fn instructions(&self, ticks: u32) -> u32 {
+    /// Instructions of so many ticks, which are those of reading the clock twice and some work.
+    #[must_use]
+    pub fn instructions(&self, ticks: u32) -> u32 {
         let scaled = u64::from(ticks.saturating_sub(self.empty_ticks)) * u64::from(NOPS);
         let nops_ticks = u64::from(self.nops_ticks);
         ((scaled + nops_ticks / 2) / nops_ticks) as u32

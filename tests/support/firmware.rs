@@ -46,26 +46,83 @@ pub fn directory() -> PathBuf {
 /// # Panics
 /// If the programs do not compile.
 pub fn build() -> Result<Firmware, Missing> {
-    let target_dir = directory().join("target");
+    let built = cargo_build(&["--bins"])?;
+    assert!(built.success, "the firmware:\n{}", built.messages);
+    let compiler = built
+        .messages
+        .lines()
+        .find_map(|line| line.strip_prefix("thumb-cargo: compiler: "))
+        .unwrap_or_else(|| panic!("no compiler named in:\n{}", built.messages));
+    Ok(Firmware {
+        compiler: compiler.to_owned(),
+        programs: programs(),
+    })
+}
+
+/// What became of a program that was to be linked.
+#[derive(Debug)]
+pub struct Linked {
+    /// Whether it was.
+    pub success: bool,
+    /// What compiler and linker said.
+    pub messages: String,
+}
+
+/// Links a program of the package `probe` in release.
+///
+/// # Errors
+/// [`Missing`] if there is no compiler for the target.
+pub fn link_probe(program: &str) -> Result<Linked, Missing> {
+    cargo_build(&["--package", "probe", "--bin", program])
+}
+
+/// Bytes of flash that a linked program takes: its sections that are loaded.
+///
+/// # Panics
+/// If the program was not linked.
+#[must_use]
+pub fn flash_bytes(program: &str) -> u32 {
+    /// Kind of a section with contents, and the flag of one that is in memory.
+    const PROGBITS: u32 = 1;
+    const ALLOC: u32 = 2;
+    let elf = fs::read(programs().join(program)).expect("a linked program");
+    let half = |at: usize| usize::from(u16::from_le_bytes([elf[at], elf[at + 1]]));
+    let word = |at: usize| {
+        let bytes = elf[at..at + 4].try_into().expect("four bytes");
+        u32::from_le_bytes(bytes)
+    };
+    let (table, entry, count) = (word(0x20) as usize, half(0x2e), half(0x30));
+    (0..count)
+        .map(|index| table + index * entry)
+        .filter(|&section| word(section + 4) == PROGBITS && word(section + 8) & ALLOC != 0)
+        .map(|section| word(section + 20))
+        .sum()
+}
+
+fn target_dir() -> PathBuf {
+    directory().join("target")
+}
+
+fn programs() -> PathBuf {
+    target_dir().join(TARGET).join("release")
+}
+
+fn cargo_build(arguments: &[&str]) -> Result<Linked, Missing> {
     let output = Command::new(directory().join("../scripts/thumb-cargo.sh"))
-        .args(["build", "--release", "--locked", "--bins"])
+        .args(["build", "--release", "--locked"])
+        .args(arguments)
         .args(["--target", TARGET, "--target-dir"])
-        .arg(&target_dir)
+        .arg(target_dir())
         .current_dir(directory())
         .output()
         .unwrap_or_else(|error| panic!("scripts/thumb-cargo.sh: {error}"));
-    let messages = String::from_utf8_lossy(&output.stderr);
+    let messages = String::from_utf8_lossy(&output.stderr).into_owned();
     if output.status.code() == Some(NO_COMPILER) {
-        return Err(Missing(messages.into_owned()));
+        return Err(Missing(messages));
     }
-    assert!(output.status.success(), "the firmware:\n{messages}");
-    let compiler = messages
-        .lines()
-        .find_map(|line| line.strip_prefix("thumb-cargo: compiler: "))
-        .unwrap_or_else(|| panic!("no compiler named in:\n{messages}"));
-    Ok(Firmware {
-        programs: target_dir.join(TARGET).join("release"),
-        compiler: compiler.to_owned(),
+    Ok(Linked {
+        success: output.status.success(),
+        messages,
     })
 }
 

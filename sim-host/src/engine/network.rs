@@ -24,14 +24,15 @@ impl HiddenSum {
         network: &Network<H, O>,
         order: &WindowOrder,
     ) -> [Self; H] {
+        let levels = network.input_levels();
         let mut sums = [Self::default(); H];
         for (sum, row) in sums.iter_mut().zip(network.hidden_rows()) {
             sum.empty = ROUNDING_Q24;
-            let inputs = order.inputs().zip(network.input_levels()).zip(row);
+            let inputs = order.inputs().zip(levels).zip(row);
             for ((bit, [low, high]), &weight) in inputs {
                 let weight = i32::from(weight);
-                sum.empty += weight * i32::from(*low);
-                sum.addends[bit] = weight * (i32::from(*high) - i32::from(*low));
+                sum.empty += weight * i32::from(low);
+                sum.addends[bit] = weight * (i32::from(high) - i32::from(low));
             }
         }
         sums

@@ -1,0 +1,13 @@
+//! What `with` has around the controller, and no controller.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use probe::use_memory;
+
+#[entry]
+fn main() -> ! {
+    loop {
+        use_memory();
+    }
+}
