@@ -157,6 +157,11 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
             }
         }
     }
+    // In the paper's order.
+    figures.sort_by_key(|figure| {
+        let number = figure.id.split('-').nth(1).and_then(|n| n.parse().ok());
+        number.unwrap_or(u32::MAX)
+    });
     let numbers = ["Fig. 13: ", "Fig. 14: "];
     for (index, resilient) in gathered.resiliences.iter().enumerate() {
         let prefix = if is_paper {
@@ -518,8 +523,8 @@ fn box_plots(
     (x_name, y_name): (&str, &str),
     panels: &[Panel],
 ) -> Result<Figure, FigureError> {
-    const WIDTH: i32 = 460;
-    const HEIGHT: i32 = 260;
+    const WIDTH: i32 = 620;
+    const HEIGHT: i32 = 300;
     let columns = panels.len().clamp(1, 2);
     let lines = panels.len().div_ceil(columns).max(1);
     let values = panels
@@ -560,6 +565,7 @@ fn box_plots(
                 .draw()
                 .map_err(|error| error.to_string())?;
             let half = 0.4 * panel.every as f64;
+            let apart = 0.5 * panel.every as f64;
             for at in (0..length).step_by(panel.every) {
                 let mut values: Vec<f64> = panel
                     .runs
@@ -582,7 +588,7 @@ fn box_plots(
                     )
                     .into_dyn(),
                     PathElement::new(
-                        vec![(x - half, middle), (x + half, middle)],
+                        vec![(x - apart, middle), (x + apart, middle)],
                         MEDIAN.stroke_width(2),
                     )
                     .into_dyn(),

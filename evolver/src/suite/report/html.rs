@@ -22,6 +22,10 @@ figure { margin: 2em 0; overflow-x: auto; } figcaption { color: var(--soft); fon
 svg { max-width: 100%; height: auto; } code { font-size: .9em; overflow-wrap: anywhere; }
 ";
 
+/// Said where experiments share runs.
+pub(super) const SHARED: &str = "Experiments that ask for the same settings and seeds share their \
+                                 runs; what is said of them is not independent.";
+
 /// The whole page.
 #[must_use]
 pub fn page(report: &Report) -> String {
@@ -94,6 +98,9 @@ pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
         ));
         lines.extend(report.differences.iter().map(|line| format!("- {line}")));
         opening.push(("Where we differ", lines));
+    }
+    if !report.looked_into.is_empty() {
+        opening.push(("What was looked into", report.looked_into.clone()));
     }
     opening
 }
@@ -253,9 +260,11 @@ fn write_making(page: &mut String, report: &Report) {
             making.hash
         );
     }
-    page.push_str(
-        "</tbody></table></div>\n<p>Every run with its seed and hash: <a href=\"runs.csv\">runs.csv</a>.</p>\n",
-    );
+    page.push_str("</tbody></table></div>\n");
+    if report.shares_runs {
+        let _ = writeln!(page, "<p>{SHARED}</p>");
+    }
+    page.push_str("<p>Every run with its seed and hash: <a href=\"runs.csv\">runs.csv</a>.</p>\n");
 }
 
 fn escape(text: &str) -> String {

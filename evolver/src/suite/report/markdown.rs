@@ -59,6 +59,9 @@ pub fn text(report: &Report) -> String {
             making.hash
         );
     }
+    if report.shares_runs {
+        let _ = writeln!(text, "\n{}", super::html::SHARED);
+    }
     text += "\nEvery run with its seed and hash: [runs.csv](runs.csv).\n";
     text
 }
@@ -98,7 +101,7 @@ fn name(name: &str, counted: &str) -> String {
 
 fn cell(value: &Value) -> String {
     let parts = [
-        ours(value),
+        ours(value).or_else(|| value.paper.map(|_| "–".to_owned())),
         interval(value).map(|interval| format!("[{interval}]")),
         theirs(value).map(|paper| format!("· {paper}")),
         verdict(value),
@@ -113,19 +116,19 @@ fn cell(value: &Value) -> String {
 
 /// Our number, with the median in brackets if it is a mean.
 pub(super) fn ours(value: &Value) -> Option<String> {
-    with_median(value.ours, value.ours_median, value.digits)
-}
-
-/// The paper's number, likewise.
-pub(super) fn theirs(value: &Value) -> Option<String> {
-    with_median(value.paper, value.paper_median, value.digits)
-}
-
-fn with_median(mean: Option<f64>, median: Option<f64>, digits: usize) -> Option<String> {
-    let mean = number(mean?, digits);
-    Some(match median {
-        Some(median) => format!("{mean} ({})", number(median, digits)),
+    let mean = number(value.ours?, value.digits);
+    Some(match value.ours_median {
+        Some(median) => format!("{mean} ({})", number(median, value.digits)),
         None => mean,
+    })
+}
+
+/// The paper's number, likewise, with the digits that it has there.
+pub(super) fn theirs(value: &Value) -> Option<String> {
+    let paper = value.paper?;
+    Some(match value.paper_median {
+        Some(median) => format!("{paper} ({median})"),
+        None => paper.to_string(),
     })
 }
 

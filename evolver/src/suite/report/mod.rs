@@ -30,6 +30,9 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use tables::Table;
 
+/// What people found out about differences, in the report's folder.
+const LOOKED_INTO: &str = "looked-into.md";
+
 /// A report cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
@@ -119,6 +122,10 @@ pub struct Report {
     pub findings: Vec<Finding>,
     /// Where tests speak against our numbers and the paper's being the same, in words.
     pub differences: Vec<String>,
+    /// What was looked into where we differ: the lines of a text that lies in the report's folder.
+    pub looked_into: Vec<String>,
+    /// Whether experiments share runs.
+    pub shares_runs: bool,
     /// Tests made in the tables.
     pub tests: usize,
     /// The tables.
@@ -148,7 +155,8 @@ struct RunRow<'a> {
 }
 
 /// Writes the report of a plan's finished runs, with the data of its tables and figures as CSV.
-/// `directory` is that of the suite, `out` that of the report, which is made.
+/// `directory` is that of the suite, `out` that of the report, which is made. If `out` has a
+/// `looked-into.md`, its text comes after the differences: paragraphs, and list items with a dash.
 ///
 /// # Errors
 /// [`ReportError`] if a finished run cannot be read or a file cannot be written.
@@ -159,7 +167,13 @@ pub fn write(
     out: &Path,
 ) -> Result<Written, ReportError> {
     let gathered = Gathered::read(plan, suite, directory)?;
-    let report = Report::of(&gathered, &suite.name)?;
+    let mut report = Report::of(&gathered, &suite.name)?;
+    let looked_into = out.join(LOOKED_INTO);
+    if looked_into.is_file() {
+        let text = files::read(&looked_into)?;
+        let text = String::from_utf8_lossy(&text);
+        report.looked_into = text.lines().map(str::to_owned).collect();
+    }
     let mut files = vec![
         ("report.html".to_owned(), html::page(&report)),
         ("report.md".to_owned(), markdown::text(&report)),
@@ -204,8 +218,15 @@ impl Report {
             .iter()
             .filter(|group| !group.is_complete())
             .map(|group| format!("{}, {}: {}", group.experiment, group.label, group.counted()));
+        let ids = gathered
+            .groups
+            .iter()
+            .flat_map(|g| g.runs.iter().map(|run| &run.id));
+        let mut seen = BTreeSet::new();
         Ok(Self {
             suite: suite.to_owned(),
+            looked_into: Vec::new(),
+            shares_runs: !ids.into_iter().all(|id| seen.insert(id)),
             missing: missing.collect(),
             findings: findings::all(gathered, &paper),
             differences: differences(&tables),
@@ -244,17 +265,8 @@ fn differences(tables: &[Table]) -> Vec<String> {
             } else {
                 &table.source
             };
-            let numbers = match (
-                value.ours_median.or(value.ours),
-                value.paper_median.or(value.paper),
-            ) {
-                (Some(ours), Some(paper)) => {
-                    format!(
-                        ": {} for {}",
-                        number(ours, value.digits),
-                        number(paper, value.digits)
-                    )
-                }
+            let numbers = match (markdown::ours(value), markdown::theirs(value)) {
+                (Some(ours), Some(paper)) => format!(": {ours}, paper {paper}"),
                 _ => String::new(),
             };
             words.push(format!(

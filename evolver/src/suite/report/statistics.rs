@@ -6,7 +6,7 @@ use crate::reevaluation::median;
 use minimal_surprise_sim::seed::uniform_below;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use statrs::distribution::{Binomial, ContinuousCDF, Discrete, Normal};
+use statrs::distribution::{Binomial, ContinuousCDF, Discrete, DiscreteCDF, Normal};
 use statrs::function::factorial::ln_factorial;
 
 /// Seed of everything drawn here.
@@ -130,7 +130,7 @@ pub fn fisher(first: &[u32], second: &[u32]) -> Test {
         }
     } else {
         Test {
-            name: "Fisher's test, tables drawn",
+            name: "Fisher's test by 100,000 drawn tables",
             p: drawn(&totals, row, observed),
         }
     }
@@ -211,13 +211,21 @@ pub fn sign(successes: u32, failures: u32) -> Test {
     }
 }
 
-/// Whether a median may be this value, given to within half a unit of its last digit: sign test of
-/// the values beyond that.
+/// Whether a median may be this value, given to within half a unit of its last digit: sign test,
+/// two-sided; values within the rounding speak neither for a larger nor for a smaller median.
 #[must_use]
 pub fn median_is(values: &[f64], median: f64, rounding: f64) -> Test {
     let above = values.iter().filter(|&&v| v > median + rounding).count();
     let below = values.iter().filter(|&&v| v < median - rounding).count();
-    sign(above as u32, below as u32)
+    let most = above.max(below) as u64;
+    let p = match Binomial::new(0.5, values.len() as u64) {
+        Ok(even) if most > 0 => (2.0 * even.sf(most - 1)).min(1.0),
+        _ => 1.0,
+    };
+    Test {
+        name: "sign test",
+        p,
+    }
 }
 
 /// Whether one sample tends to larger values than the other: Mann and Whitney's test, two-sided,
@@ -268,7 +276,7 @@ mod tests {
 
     #[test]
     fn wilson_gives_the_published_intervals() {
-        // R: prop.test(x, n, correct = FALSE)
+        // The last two are Newcombe's examples (1998); the others follow from the formula.
         for (successes, of, low, high) in [
             (0.0, 20.0, 0.0, 0.161_125),
             (10.0, 20.0, 0.299_298, 0.700_702),
@@ -307,16 +315,25 @@ mod tests {
 
     #[test]
     fn the_sign_test_is_the_binomial_test() {
-        // R: binom.test(9, 10), binom.test(5, 18)
+        // 2 · 11 / 2¹⁰ and 2 · 12,616 / 2¹⁸, sums of binomial coefficients.
         assert_close(sign(9, 1).p, 0.021_484, 1e-6);
         assert_close(sign(5, 13).p, 0.096_252, 1e-6);
         assert_close(sign(0, 0).p, 1.0, 0.0);
-        assert_close(median_is(&[0.1, 0.2, 0.31, 0.9], 0.3, 0.02).p, 1.0, 1e-9);
     }
 
     #[test]
-    fn mann_whitney_gives_the_published_value() {
-        // R: wilcox.test(first, second, exact = FALSE)
+    fn a_median_is_told_by_the_values_beyond_its_rounding() {
+        assert_close(median_is(&[0.1, 0.2, 0.31, 0.9], 0.3, 0.02).p, 1.0, 1e-9);
+        assert_close(median_is(&[0.4; 9], 0.3, 0.02).p, 2.0 / 512.0, 1e-9);
+        // Seven of twenty above, none below, the others as printed: the median is as printed too.
+        let mut values = [0.0; 20];
+        values[..7].fill(0.5);
+        assert_eq!(median_is(&values, 0.0, 0.005).p, 1.0);
+    }
+
+    #[test]
+    fn mann_whitney_gives_the_value_worked_out_by_hand() {
+        // U = 35 of 50 pairs, standard deviation √(50 · 16 / 12), continuity 0.5: z = 1.1635.
         let first = [0.80, 0.83, 1.89, 1.04, 1.45, 1.38, 1.91, 1.64, 0.73, 1.46];
         let second = [1.15, 0.88, 0.90, 0.74, 1.21];
         assert_close(mann_whitney(&first, &second).p, 0.2446, 1e-4);
@@ -335,7 +352,7 @@ mod tests {
         let values: Vec<f64> = (0..41).map(f64::from).collect();
         let interval = median_interval(&values).unwrap();
         assert_eq!(median_interval(&values), Some(interval));
-        // Order statistics 14 and 28 of 41 have a coverage of 95.6 %.
+        // Order statistics 14 and 28 of 41, the values 13 and 27, hold it with 97.2 %.
         assert_close(interval.low, 13.0, 1.5);
         assert_close(interval.high, 27.0, 1.5);
         assert_eq!(median_interval(&[]), None);

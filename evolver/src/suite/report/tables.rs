@@ -13,6 +13,9 @@ use serde::Serialize;
 /// Name of the measure that the paper gives for most settings.
 pub const MEDIAN_BEST_FITNESS: &str = "median best fitness";
 
+/// Genomes whose lines go no way in most of their new starts.
+const DIVERSE: &str = "diverse";
+
 /// A number of ours beside the paper's.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Value {
@@ -109,6 +112,7 @@ struct Shared<'a> {
     setting: String,
     counted: String,
     runs: Vec<Vec<String>>,
+    of: Of,
     paper: Option<&'a Distribution>,
 }
 
@@ -118,6 +122,8 @@ impl Shared<'_> {
         let together = self.paper.is_some_and(|d| d.percent.contains_key(GROUPING));
         if category == GROUPING {
             together
+        } else if category == DIVERSE {
+            self.of == Of::NewStarts
         } else {
             !(together && structure_named(category).is_some_and(is_grouping))
         }
@@ -162,7 +168,9 @@ fn structure_tables(
             sources.push(source);
         }
     }
-    let tables = sources.into_iter().map(|source| {
+    // In the paper's order; what it does not have comes last.
+    sources.sort_by_key(|source| (source.is_empty(), source.clone()));
+    let tables = sources.into_iter().filter_map(|source| {
         let repeated = gathered.groups.iter().filter(|group| {
             of_paper(group).is_some_and(|d| d.also.is_some() && d.also.as_ref() == Some(&source))
         });
@@ -177,6 +185,7 @@ fn structure_tables(
                 setting: format!("{}: {}", group.experiment, group.label),
                 counted: group.counted(),
                 runs: structure_categories(group, of_paper(group)),
+                of: Of::Structures,
                 paper: of_paper(group),
             })
             .collect();
@@ -190,7 +199,8 @@ fn structure_tables(
         let title =
             format!("{experiment}: percentage of runs by the structure they are named after");
         let categories = structure_order(&shared);
-        share_table(id, source, title, &shared, &categories)
+        let table = share_table(id, source, title, &shared, &categories);
+        (!categories.is_empty()).then_some(table)
     });
     tables.collect()
 }
@@ -505,7 +515,8 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
             .within(wilson(spanning as f64, of as f64), 100.0);
             if let Some(number) = paper.number(experiment, &group.label, measure) {
                 value.paper = Some(number.value);
-                let shares = paper.distribution(Of::Structures, experiment, &group.label);
+                let of_paper = |of| paper.distribution(of, experiment, &group.label);
+                let shares = of_paper(Of::Structures).or_else(|| of_paper(Of::Orientation));
                 if let Some(shares) = shares
                     && of > 0
                 {
@@ -525,6 +536,39 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
                 }
             }
             row.values.push(Some(value));
+        }
+    }
+    let counts: [(&str, bool); 2] = [
+        ("fewest sensors predicted above 0.5 in a grouping run", true),
+        ("most sensors predicted above 0.5 in a line run", false),
+    ];
+    for (measure, grouping) in counts.into_iter().filter(|(m, _)| wanted(m)) {
+        columns.push(measure.to_owned());
+        for (row, group) in rows.iter_mut().zip(groups) {
+            let wanted = |run: &&Run| {
+                run.name().is_some_and(|name| {
+                    if grouping {
+                        is_grouping(name)
+                    } else {
+                        name == Structure::Line
+                    }
+                })
+            };
+            let runs = group.runs.iter().filter(wanted);
+            let numbers: Vec<usize> = runs.map(sensors_predicted_often).collect();
+            let extreme = if grouping {
+                numbers.iter().min()
+            } else {
+                numbers.iter().max()
+            };
+            row.values.push(Some(Value {
+                of: numbers.len(),
+                ours: extreme.map(|&number| number as f64),
+                paper: paper
+                    .number(experiment, &group.label, measure)
+                    .map(|n| n.value),
+                ..Value::new(&format!("{experiment}: {}", group.label), measure)
+            }));
         }
     }
     if groups.is_empty() {
@@ -556,6 +600,15 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
     })
 }
 
+/// Sensors that the prediction network of a run predicts, on average, more often occupied than not.
+fn sensors_predicted_often(run: &Run) -> usize {
+    let predicted = run.finished.settings.topology.predicted();
+    let averages = run.average_prediction.iter().enumerate();
+    averages
+        .filter(|&(sensor, &average)| predicted.get(sensor) && average > 0.5)
+        .count()
+}
+
 /// Table 6: which way the lines go, in the runs and from new starts.
 fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
     let is_line = |group: &&Group| {
@@ -573,12 +626,13 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
             setting: format!("{}: {}, as evolved", key.0, key.1),
             counted: group.counted(),
             runs: group.runs.iter().map(of_run).collect(),
+            of: Of::Orientation,
             paper: paper.distribution(Of::Orientation, key.0, key.1),
         });
         let again = |r: &&Reevaluated| r.experiment == key.0 && r.label == key.1;
         for reevaluated in gathered.reevaluations.iter().filter(again) {
             let of_genome = |orientation: Option<LineOrientation>| {
-                let name = orientation.map_or("diverse", LineOrientation::name);
+                let name = orientation.map_or(DIVERSE, LineOrientation::name);
                 vec![name.to_owned()]
             };
             let orientations = reevaluated.orientations();
@@ -587,6 +641,7 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
                 setting: format!("{}: {}, new starts", key.0, key.1),
                 counted: group.counted(),
                 runs: orientations.into_iter().map(of_genome).collect(),
+                of: Of::NewStarts,
                 paper: paper.distribution(Of::NewStarts, key.0, key.1),
             });
         }
@@ -602,7 +657,7 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
         "mostly vertical",
         "mostly horizontal",
         "maze-like",
-        "diverse",
+        DIVERSE,
         NONE,
     ]
     .map(str::to_owned)
@@ -626,7 +681,8 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
                       more than half of them give, else as diverse."
             .to_owned();
     table.notes.retain(|note| !note.starts_with("All together"));
-    for reevaluated in &gathered.reevaluations {
+    let done = |reevaluated: &&Reevaluated| !reevaluated.genomes.is_empty();
+    for reevaluated in gathered.reevaluations.iter().filter(done) {
         let all: Vec<&[Structure]> = reevaluated
             .genomes
             .iter()
