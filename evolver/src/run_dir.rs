@@ -234,6 +234,9 @@ impl RunDir {
         let mut buffer = [0; CONTAINER_BYTES_MAX];
         let genome = codec::encode(&finding.genome, finding.provenance, &mut buffer)
             .expect("the buffer holds any genome");
+        // Once more: the last checkpoint may have been written by a process that got no further.
+        let table = tables::generations(experiment);
+        files::replace(&self.file(GENERATIONS), table.as_bytes())?;
         files::replace(&self.file(BEST), genome)?;
         let final_state = tables::final_state(experiment.settings(), finding);
         files::replace(&self.file(FINAL), final_state.as_bytes())?;
