@@ -4,6 +4,7 @@ use crate::evolution::{Population, best_slot};
 use crate::generation_work::Work;
 use crate::run_hash::RunHash;
 use crate::settings::Settings;
+use crate::steps_hash::StepsHash;
 use minimal_surprise_controller::{Controller, Genome, Provenance};
 use minimal_surprise_sim::evaluation::{Outcome, run};
 use minimal_surprise_sim::metrics::Measures;
@@ -64,6 +65,8 @@ pub struct Finding {
     pub outcome: Outcome,
     /// How it went.
     pub measures: Measures,
+    /// The hash of its steps.
+    pub steps_hash: StepsHash,
     /// What the swarm formed.
     pub structures: Structures,
     /// The run's hash.
@@ -196,8 +199,10 @@ impl Experiment {
         let trial = scenario.trial(seeds, record.generation, record.worst_repetition);
         let mut measures =
             Measures::starting_from(scenario.grid(), self.settings.topology, &trial.starts);
+        let mut steps_hash = StepsHash::starting_from(&trial.starts);
         let outcome = run(&Controller::new(genome), scenario, &trial, |world| {
             measures.observe(world);
+            steps_hash.observe(world);
         })?;
         Ok(Some(Finding {
             genome: genome.clone(),
@@ -212,6 +217,7 @@ impl Experiment {
             hash: self.hash.end(genome, &outcome.final_poses),
             structures: classify(scenario.grid(), &outcome.final_poses)?,
             measures,
+            steps_hash,
             outcome,
         }))
     }

@@ -27,6 +27,8 @@ pub struct FinishedRun {
     pub final_poses: Vec<Pose>,
     /// The run's hash.
     pub hash: String,
+    /// The hash of its steps; a run of an older program has none.
+    pub steps_hash: Option<String>,
 }
 
 /// A run directory cannot be read back.
@@ -127,6 +129,8 @@ pub struct FinalState {
     pub final_poses: Vec<Pose>,
     /// The repetition that it was run from.
     pub repetition: u32,
+    /// The hash of the steps in between, if the file has it.
+    pub steps_hash: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -138,6 +142,7 @@ struct VersionOnly {
 struct FinalFile {
     grid: String,
     repetition: u32,
+    steps_hash: Option<String>,
     start: Vec<Pose>,
     r#final: Vec<Pose>,
 }
@@ -182,6 +187,7 @@ pub fn parse_final_state(path: &Path, bytes: &[u8]) -> Result<FinalState, StateE
         starts: file.start,
         final_poses: file.r#final,
         repetition: file.repetition,
+        steps_hash: file.steps_hash,
     })
 }
 
@@ -233,6 +239,7 @@ impl FinishedRun {
             starts: state.starts,
             final_poses: state.final_poses,
             hash: String::from_utf8_lossy(&hash).trim().to_owned(),
+            steps_hash: state.steps_hash,
             settings,
         })
     }

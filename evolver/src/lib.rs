@@ -25,4 +25,7 @@ pub mod robot;
 pub mod run_dir;
 pub mod run_hash;
 pub mod settings;
+pub mod steps_hash;
 pub mod suite;
+pub mod time_spent;
+pub mod usage;

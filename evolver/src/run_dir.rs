@@ -6,6 +6,7 @@
 //! | `meta.json` | schema version, seed, program, revision, compiler, command line |
 //! | `generations.csv` | a line a generation |
 //! | `best.genome` | the last generation's best genome |
+//! | `time.json` | how long it took, over all sittings |
 //! | `final.json` | where it started from and ended, fitness, average predictions |
 //! | `DONE` | the run's hash; the run is complete |
 //! | `checkpoint` | until the run is complete: where it goes on |
@@ -17,6 +18,7 @@ use crate::experiment::{Experiment, Finding};
 use crate::files::{self, FileError};
 use crate::report::tables;
 use crate::settings::{Given, SettingError, Settings};
+use crate::time_spent::{TimeSpent, Timer};
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -26,6 +28,7 @@ use std::path::{Path, PathBuf};
 pub struct RunDir {
     path: PathBuf,
     settings_text: String,
+    timer: Timer,
     /// Holds the lock for as long as it lives.
     _lock: Option<File>,
 }
@@ -35,6 +38,7 @@ pub struct RunDir {
 pub struct Checkpoint {
     state: Vec<u8>,
     generations: String,
+    time: String,
 }
 
 /// A run directory cannot be used.
@@ -85,6 +89,7 @@ const META: &str = "meta.json";
 const GENERATIONS: &str = "generations.csv";
 const BEST: &str = "best.genome";
 const FINAL: &str = "final.json";
+const TIME: &str = "time.json";
 const DONE: &str = "DONE";
 
 /// What `--resume` finds.
@@ -117,6 +122,7 @@ impl RunDir {
             _lock: lock(&part)?,
             path: part.clone(),
             settings_text,
+            timer: Timer::after(TimeSpent::default()),
         };
         run.save(experiment)?;
         let meta = tables::meta(experiment.settings());
@@ -192,9 +198,13 @@ impl RunDir {
                 error,
             }
         })?;
+        // A run from before there was such a file has none.
+        let spent = fs::read(path.join(TIME))
+            .map_or_else(|_| TimeSpent::default(), |bytes| TimeSpent::of_json(&bytes));
         let run = Self {
             path: path.to_owned(),
             settings_text,
+            timer: Timer::after(spent),
             _lock: lock,
         };
         Ok(Found::Unfinished(Box::new(experiment), run))
@@ -214,6 +224,7 @@ impl RunDir {
         Checkpoint {
             state: checkpoint::encode(experiment, &self.settings_text),
             generations: tables::generations(experiment),
+            time: self.timer.spent().json(),
         }
     }
 
@@ -223,7 +234,8 @@ impl RunDir {
     /// [`FileError`] if a file cannot be written; the last checkpoint is then still there.
     pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), FileError> {
         files::replace(&self.file(CHECKPOINT), &checkpoint.state)?;
-        files::replace(&self.file(GENERATIONS), checkpoint.generations.as_bytes())
+        files::replace(&self.file(GENERATIONS), checkpoint.generations.as_bytes())?;
+        files::replace(&self.file(TIME), checkpoint.time.as_bytes())
     }
 
     /// Saves the result and marks the run complete.
@@ -240,6 +252,8 @@ impl RunDir {
         files::replace(&self.file(BEST), genome)?;
         let final_state = tables::final_state(experiment.settings(), finding);
         files::replace(&self.file(FINAL), final_state.as_bytes())?;
+        let time = self.timer.spent().json();
+        files::replace(&self.file(TIME), time.as_bytes())?;
         files::replace(&self.file(DONE), format!("{}\n", finding.hash).as_bytes())?;
         for name in [CHECKPOINT, LOCK] {
             let path = self.file(name);

@@ -6,8 +6,8 @@
 
 pub mod f32_program;
 pub mod populations;
-pub mod usage;
 
+use crate::usage::{self, Stopwatch};
 use minimal_surprise_controller::{Controller, Genome, SensorModel, Topology};
 use minimal_surprise_sim::{
     Engine, Evaluator, Grid, NoiseRate, Path, Scenario, SeedTree, Trial, TrialSet, World,
@@ -16,7 +16,6 @@ use serde::Serialize;
 use std::io;
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
-use usage::Stopwatch;
 
 /// What `evolver bench` prints. Speeds are robot-steps a CPU-second, model C on 15 × 15 unless
 /// named.
