@@ -12,6 +12,7 @@ use crate::commands::hil::{HilArgs, hil};
 use crate::commands::import::{ImportArgs, import};
 use crate::commands::inspect::inspect;
 use crate::commands::monitor::{MonitorArgs, monitor};
+use crate::commands::replay::{ReplayArgs, replay};
 use crate::commands::suite::{SuiteArgs, TaskArgs, Verb, paper, run_task, suite};
 use crate::run_dir::RunDirError;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -49,6 +50,8 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Look at a run: in the terminal, or as a page or pictures.
+    Replay(ReplayArgs),
     /// Evaluate a genome from new starts, on other grids, with other noise and swarm sizes.
     Evaluate(EvaluateArgs),
     /// Take a part of what a swarm formed away, or scatter it, and see what the swarm does.
@@ -93,6 +96,7 @@ pub fn main() -> ExitCode {
         Some(Command::Evolve(arguments)) => evolve(&arguments),
         Some(Command::Bench { json }) => bench(json).map(done),
         Some(Command::Classify { state, json }) => classify(&state, json).map(done),
+        Some(Command::Replay(arguments)) => replay(&arguments).map(done),
         Some(Command::Evaluate(arguments)) => evaluate(&arguments).map(done),
         Some(Command::Damage(arguments)) => damage(&arguments).map(done),
         Some(Command::Export(arguments)) => export(&arguments).map(done),

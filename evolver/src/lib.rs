@@ -20,6 +20,7 @@ pub mod finished_run;
 pub mod generation_work;
 pub mod hil;
 pub mod reevaluation;
+pub mod replay;
 pub mod report;
 pub mod robot;
 pub mod run_dir;

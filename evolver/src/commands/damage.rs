@@ -93,7 +93,8 @@ pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn corners(text: &str) -> Result<[u32; 4], String> {
+/// Corners of an area.
+pub(super) fn corners(text: &str) -> Result<[u32; 4], String> {
     let numbers: Option<Vec<u32>> = text
         .split(',')
         .map(|part| part.trim().parse().ok())

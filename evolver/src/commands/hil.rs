@@ -1,14 +1,14 @@
 //! `evolver hil`: a simulated swarm with the robot on the line in it.
 
+use super::conditions::GenomeConditions;
 use super::{BadInput, PortArgs, read_genome};
 use crate::finished_run::FinishedRun;
 use crate::hil::{Course, HilError, Ran};
 use crate::report::summary::program;
 use crate::robot::{Robot, RobotError, describe, is_in_use};
-use crate::settings::{Given, Settings, model_name};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use minimal_surprise_controller::{Controller, EncodedGenome, Prediction};
+use minimal_surprise_controller::{Controller, EncodedGenome};
 use minimal_surprise_sim::SeedTree;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -24,33 +24,8 @@ pub struct HilArgs {
     /// Only simulate, without a robot.
     #[arg(long, required_unless_present = "port", conflicts_with = "port")]
     simulate: bool,
-    /// For a genome: width and height of the torus, in cells [default: 15x15].
-    #[arg(long, value_name = "WxH", allow_hyphen_values = true)]
-    grid: Option<String>,
-    /// For a genome: swarm size [default: 100].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    robots: Option<String>,
-    /// For a genome: steps [default: 500].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    steps: Option<String>,
-    /// For a genome: probability that a sensor bit is flipped [default: 0].
-    #[arg(long, value_name = "P", allow_hyphen_values = true)]
-    noise: Option<String>,
-    /// For a genome: root of all random numbers [default: the seed that it evolved with, else 0].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    seed: Option<String>,
-}
-
-impl HilArgs {
-    fn flags(&self) -> [(&'static str, &Option<String>); 5] {
-        [
-            ("grid", &self.grid),
-            ("robots", &self.robots),
-            ("steps", &self.steps),
-            ("noise", &self.noise),
-            ("seed", &self.seed),
-        ]
-    }
+    #[command(flatten)]
+    conditions: GenomeConditions,
 }
 
 /// Runs a swarm whose robot 0 is on the line, and compares with the simulation.
@@ -105,12 +80,9 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<ExitCode> {
 /// The run that a directory holds, and the file of its genome.
 fn of_run(arguments: &HilArgs) -> Result<(Course, PathBuf), BadInput> {
     let directory = &arguments.run;
-    if let Some((flag, _)) = arguments.flags().iter().find(|(_, given)| given.is_some()) {
-        return Err(BadInput::new(format!(
-            "--{flag} and a run directory exclude each other; {} says what to run",
-            directory.display()
-        )));
-    }
+    arguments
+        .conditions
+        .refuse_beside("a run directory", directory)?;
     let finished = FinishedRun::read(directory).map_err(BadInput::new)?;
     let course = Course {
         controller: Controller::new(&finished.genome),
@@ -124,21 +96,7 @@ fn of_run(arguments: &HilArgs) -> Result<(Course, PathBuf), BadInput> {
 fn of_genome(arguments: &HilArgs) -> Result<(Course, PathBuf), BadInput> {
     let bytes = read_genome(&arguments.run)?;
     let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
-    let topology = encoded.topology();
-    let mut given = Given::default();
-    for (key, value) in arguments.flags() {
-        given.flag(key, value.as_deref());
-    }
-    given.flag("sensor-model", Some(model_name(topology.model())));
-    match topology.prediction() {
-        Prediction::Free => {}
-        Prediction::PartlyPredefined(template) => {
-            given.flag("predefine-partly", Some(template.name()));
-        }
-        Prediction::Predefined(template) => given.flag("predefine", Some(template.name())),
-    }
-    let seed = encoded.provenance().seed.unwrap_or(0);
-    let settings = Settings::resolve(&given, || seed).map_err(BadInput::new)?;
+    let settings = arguments.conditions.settings(&encoded)?;
     let course = Course {
         controller: Controller::from_encoded(&encoded),
         scenario: settings.scenario,

@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod classify;
+pub mod conditions;
 pub mod damage;
 pub mod evaluate;
 pub mod evolve;
@@ -11,6 +12,7 @@ pub mod hil;
 pub mod import;
 pub mod inspect;
 pub mod monitor;
+pub mod replay;
 pub mod suite;
 
 use crate::files;

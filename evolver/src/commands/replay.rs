@@ -1,0 +1,133 @@
+//! `evolver replay`: look at a run.
+
+use super::conditions::GenomeConditions;
+use super::damage::corners;
+use super::evaluate::flag;
+use super::{BadInput, read_genome};
+use crate::files;
+use crate::finished_run::FinishedRun;
+use crate::replay::recording::{Origin, Recording};
+use crate::replay::scene::Colouring;
+use clap::Args;
+use minimal_surprise_controller::EncodedGenome;
+use minimal_surprise_sim::damage::Damage;
+use minimal_surprise_sim::exchange::Trajectory;
+use minimal_surprise_sim::{Area, SeedTree};
+use std::path::{Path, PathBuf};
+
+/// What to look at, and how.
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// A run directory, a genome file, or an agent_trajectory.
+    run: PathBuf,
+    /// For a run: take the robots in this area of its final state away, and go on from there.
+    #[arg(long, value_name = "x0,y0,x1,y1", allow_hyphen_values = true)]
+    remove: Option<String>,
+    /// For a run: put the robots in this area of its final state elsewhere, and go on from there.
+    #[arg(
+        long,
+        value_name = "x0,y0,x1,y1",
+        allow_hyphen_values = true,
+        conflicts_with = "remove"
+    )]
+    reposition: Option<String>,
+    #[command(flatten)]
+    conditions: GenomeConditions,
+    /// What the colours of robots say.
+    #[arg(long, value_enum, default_value_t)]
+    colour: Colouring,
+}
+
+/// Shows a run.
+///
+/// # Errors
+/// [`BadInput`] if there is nothing to look at, or a flag does not fit.
+pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
+    let recording = recording(arguments)?;
+    if recording.steps() == 0 {
+        return Err(BadInput::new(format!(
+            "{}: it has one state and no step; there is nothing to replay",
+            arguments.run.display()
+        ))
+        .into());
+    }
+    let _ = (recording, arguments.colour);
+    Ok(())
+}
+
+fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {
+    let path = &arguments.run;
+    let name = path.display().to_string();
+    let conditions = &arguments.conditions;
+    if path.is_dir() {
+        conditions.refuse_beside("a run directory", path)?;
+        let finished = FinishedRun::read(path).map_err(BadInput::new)?;
+        return of_run(arguments, &name, &finished);
+    }
+    for (flag, given) in [
+        ("remove", &arguments.remove),
+        ("reposition", &arguments.reposition),
+    ] {
+        if given.is_some() {
+            return Err(BadInput::new(format!(
+                "--{flag}: {name} is not a run directory, whose final state could be damaged"
+            )));
+        }
+    }
+    let bytes = files::read(path).map_err(BadInput::new)?;
+    match std::str::from_utf8(&bytes) {
+        Ok(text) if text.trim_start_matches('\u{feff}').starts_with("Gen:") => {
+            conditions.refuse_beside("a trajectory", path)?;
+            let trajectory = Trajectory::read(text)
+                .map_err(|error| BadInput::new(format!("{name}, {error}")))?;
+            Recording::of_trajectory(&name, &trajectory).map_err(BadInput::new)
+        }
+        _ => of_genome(conditions, path, &name),
+    }
+}
+
+fn of_run(
+    arguments: &ReplayArgs,
+    name: &str,
+    finished: &FinishedRun,
+) -> Result<Recording, BadInput> {
+    let grid = finished.settings.scenario.grid();
+    let areas = [
+        ("remove", &arguments.remove, Damage::Remove as fn(Area) -> _),
+        ("reposition", &arguments.reposition, Damage::Reposition),
+    ];
+    let given = areas.into_iter().find_map(|(flag, text, damage)| {
+        let text = text.as_deref()?;
+        Some((flag, text, damage))
+    });
+    let Some((name_of_flag, text, damage)) = given else {
+        return Recording::of_run(name, finished).map_err(BadInput::new);
+    };
+    let about = |error: &dyn std::fmt::Display| {
+        BadInput::new(format!("--{name_of_flag} = {text}: {error}"))
+    };
+    let [x0, y0, x1, y1] = flag(name_of_flag, text, corners)?;
+    let area = Area::new(grid, x0, y0, x1, y1).map_err(|error| about(&error))?;
+    Recording::of_damage(name, finished, damage(area)).map_err(|error| about(&error))
+}
+
+/// The run that the flags ask for: the first trial of their seed.
+fn of_genome(
+    conditions: &GenomeConditions,
+    path: &Path,
+    name: &str,
+) -> Result<Recording, BadInput> {
+    let bytes = read_genome(path)?;
+    let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
+    let settings = conditions.settings(&encoded)?;
+    let seeds = SeedTree::new(settings.seed);
+    let origin = Origin {
+        name: name.to_owned(),
+        seed: Some(settings.seed),
+        noise: settings.written.noise,
+        ..Origin::default()
+    };
+    let scenario = &settings.scenario;
+    let trial = scenario.trial(seeds, 0, 0);
+    Recording::of_trial(&encoded.to_genome(), scenario, &trial, origin).map_err(BadInput::new)
+}

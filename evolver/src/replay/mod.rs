@@ -1,0 +1,8 @@
+//! Replays: looking at a run, in the terminal, on a page, in pictures.
+//!
+//! [`recording`] is what there is to see, made of the files that a run leaves behind; [`scene`] is
+//! one state of it to draw, in the colours of [`palette`]; everything else here draws scenes.
+
+pub mod palette;
+pub mod recording;
+pub mod scene;

@@ -1,0 +1,105 @@
+//! Colours and outlines, the same in every picture: told apart by the colour-blind, and by shape
+//! where colour is not enough. The hues are Okabe and Ito's.
+
+use super::scene::{Ink, Mark};
+use serde::Serialize;
+
+/// Colours on light or on dark ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Theme {
+    /// Behind everything.
+    pub ground: &'static str,
+    /// An empty cell.
+    pub cell: &'static str,
+    /// Lines between cells.
+    pub line: &'static str,
+    /// Words.
+    pub text: &'static str,
+    /// Words that matter less, and axes.
+    pub soft: &'static str,
+    /// Robots of [`Ink::Plain`].
+    pub plain: &'static str,
+    /// Robots of the named structure.
+    pub named: &'static str,
+    /// Robots of another structure.
+    pub other: &'static str,
+    /// Robots of no structure; only their outline is drawn.
+    pub outside: &'static str,
+    /// Robots by surprise, from none to most.
+    pub surprise: [&'static str; 4],
+    /// What was predicted right.
+    pub hit: &'static str,
+    /// What was mispredicted.
+    pub miss: &'static str,
+    /// What is yet to be sensed, and the area that was damaged.
+    pub expects: &'static str,
+}
+
+/// On light ground.
+pub const LIGHT: Theme = Theme {
+    ground: "#ffffff",
+    cell: "#f4f4f2",
+    line: "#dcdcd8",
+    text: "#1c1c1a",
+    soft: "#6a6a66",
+    plain: "#2b2b29",
+    named: "#0072b2",
+    other: "#c47a00",
+    outside: "#6a6a66",
+    surprise: ["#4b4b48", "#0072b2", "#c47a00", "#c2410c"],
+    hit: "#00805e",
+    miss: "#c2410c",
+    expects: "#8a5aa8",
+};
+
+/// On dark ground.
+pub const DARK: Theme = Theme {
+    ground: "#161615",
+    cell: "#20201f",
+    line: "#343432",
+    text: "#ececea",
+    soft: "#a3a39e",
+    plain: "#dcdcd8",
+    named: "#56b4e9",
+    other: "#e69f00",
+    outside: "#a3a39e",
+    surprise: ["#b4b4b0", "#56b4e9", "#e69f00", "#ff7f50"],
+    hit: "#2fc89f",
+    miss: "#ff7f50",
+    expects: "#cc9ee0",
+};
+
+/// The outline of a robot that faces east, in a cell from (0, 0), north-west, to (1, 1): an arrow
+/// head.
+pub const ARROW: [[f64; 2]; 4] = [[0.88, 0.5], [0.16, 0.84], [0.32, 0.5], [0.16, 0.16]];
+
+impl Theme {
+    /// The colour of a robot.
+    #[must_use]
+    pub fn ink(&self, ink: Ink) -> &'static str {
+        match ink {
+            Ink::Plain => self.plain,
+            Ink::Named => self.named,
+            Ink::Other => self.other,
+            Ink::Outside => self.outside,
+            Ink::Surprise(level) => self.surprise[usize::from(level.min(3))],
+        }
+    }
+
+    /// The colour of a mark. Hits are drawn as squares, misses as crosses, what is expected as
+    /// rings; where a robot was sensed (or is expected) they are filled (thick), else hollow (thin).
+    #[must_use]
+    pub fn mark(&self, mark: Mark) -> &'static str {
+        match mark {
+            Mark::HitOccupied | Mark::HitEmpty => self.hit,
+            Mark::MissOccupied | Mark::MissEmpty => self.miss,
+            Mark::ExpectsOccupied | Mark::ExpectsEmpty => self.expects,
+        }
+    }
+}
+
+/// Whether only the outline of a robot is drawn.
+#[must_use]
+pub fn is_hollow(ink: Ink) -> bool {
+    matches!(ink, Ink::Outside | Ink::Surprise(0))
+}
