@@ -4,12 +4,14 @@ use super::evaluate::flag;
 use super::evolve::stop_on_ctrl_c;
 use super::{BadInput, thread_pool};
 use crate::files;
+use crate::finished_run::ReadRunError;
 use crate::report::progress::ProgressMode;
-use crate::report::suite_progress::SuiteProgress;
+use crate::report::suite_progress::{SearchProgress, SuiteProgress};
 use crate::settings::count;
 use crate::suite::plan::{Plan, PlannedRun};
+use crate::suite::search::{Search, look};
 use crate::suite::work::{Progress, Shard, Worked, progress, work_on};
-use crate::suite::{PAPER, Suite, report, slurm};
+use crate::suite::{PAPER, Resilience, Suite, report, slurm};
 use clap::{Args, Subcommand, ValueEnum};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -169,7 +171,7 @@ pub fn run_task(arguments: &TaskArgs) -> anyhow::Result<ExitCode> {
     let read = read(&file)?;
     let plan = plan(&read.suite, &arguments.choice)?;
     let directory = directory(&read.suite, &arguments.choice);
-    run(&plan, shard, &directory, &arguments.manner)
+    run(&plan, shard, &[], &directory, &arguments.manner)
 }
 
 fn read(file: &Path) -> Result<Read, BadInput> {
@@ -189,7 +191,10 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
     let directory = directory(&read.suite, choice);
     match verb {
         Verb::Plan(_) => print_plan(&plan),
-        Verb::Status(_) => print_status(&plan, &directory),
+        Verb::Status(_) => {
+            print_status(&plan, &directory);
+            print_searches(&plan, &read.suite, &directory).map_err(BadInput::new)?;
+        }
         Verb::Report(_) => {
             let written = report::write(&plan, &read.suite, &directory, &directory.join("report"))?;
             show_line!(
@@ -199,7 +204,14 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
                 written.html.display()
             );
         }
-        Verb::Run { manner, .. } => return run(&plan, Shard::ALL, &directory, manner),
+        Verb::Run { manner, .. } => {
+            // With another number of runs it is another experiment.
+            let searching = match choice.runs {
+                None => read.suite.resiliences.as_slice(),
+                Some(_) => &[],
+            };
+            return run(&plan, Shard::ALL, searching, &directory, manner);
+        }
         Verb::Submit {
             engine: ClusterEngine::Slurm,
             shards,
@@ -303,15 +315,54 @@ fn print_status(plan: &Plan, directory: &Path) {
     }
 }
 
-fn run(plan: &Plan, shard: Shard, directory: &Path, manner: &Manner) -> anyhow::Result<ExitCode> {
+fn print_searches(plan: &Plan, suite: &Suite, directory: &Path) -> Result<(), ReadRunError> {
+    for asked in &suite.resiliences {
+        let said = match look(plan, asked, directory, 0)? {
+            Search::NotNeeded => continue,
+            Search::Waits => "waits for the runs that it searches through".to_owned(),
+            Search::Next(_, number) => format!(
+                "no {} yet; {} runs beyond the plan done",
+                asked.structure,
+                number - 1
+            ),
+            Search::Found(run, number) => format!(
+                "{} in run {number} beyond the plan, seed {}",
+                asked.structure, run.seed
+            ),
+            Search::InVain(number) => {
+                format!("no {} in {number} runs beyond the plan", asked.structure)
+            }
+        };
+        show_line!("{}\n  {said}", asked.name);
+    }
+    Ok(())
+}
+
+/// Does the runs of a shard, then those beyond the plan that experiments search through.
+fn run(
+    plan: &Plan,
+    shard: Shard,
+    searching: &[Resilience],
+    directory: &Path,
+    manner: &Manner,
+) -> anyhow::Result<ExitCode> {
     let threads = match &manner.threads {
         Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
         None => None,
     };
     let runs = shard.of_plan(plan);
     let stop = stop_on_ctrl_c()?;
-    let worked =
-        thread_pool(threads)?.install(|| work(plan, &runs, directory, manner.progress, &stop))?;
+    let worked = thread_pool(threads)?.install(|| -> anyhow::Result<_> {
+        let Some(elsewhere) = work(plan, &runs, directory, manner.progress, &stop)? else {
+            return Ok(None);
+        };
+        for asked in searching {
+            if !search(plan, asked, directory, manner.progress, &stop)? {
+                return Ok(None);
+            }
+        }
+        Ok(Some(elsewhere))
+    })?;
     let Some(elsewhere) = worked else {
         eprintln!("interrupted; the same command goes on");
         return Ok(ExitCode::from(EXIT_INTERRUPTED));
@@ -377,6 +428,32 @@ fn work(
     }
     shown.end();
     Ok(Some(elsewhere))
+}
+
+/// Evolves on until a run has the structure that an experiment is about; false if interrupted.
+fn search(
+    plan: &Plan,
+    asked: &Resilience,
+    directory: &Path,
+    mode: ProgressMode,
+    stop: &AtomicBool,
+) -> anyhow::Result<bool> {
+    let shown = SearchProgress::start(mode, &asked.name);
+    let mut after = 0;
+    let ended = loop {
+        let Search::Next(run, number) = look(plan, asked, directory, after)? else {
+            break true;
+        };
+        shown.begins(&run, number, &asked.name);
+        match work_on(&run, directory, stop, |_| {})? {
+            Worked::Completed => after = number - 1,
+            // Another process searches, too, and its run decides whether more are needed.
+            Worked::Elsewhere => break true,
+            Worked::Interrupted => break false,
+        }
+    };
+    shown.end();
+    Ok(ended)
 }
 
 /// A line a run: its name and its hash.

@@ -125,7 +125,7 @@ fn bar(generations: u32, done: u32) -> ProgressBar {
 }
 
 /// A duration as people say it.
-pub(super) fn seconds(duration: Duration) -> String {
+pub(crate) fn seconds(duration: Duration) -> String {
     let seconds = duration.as_secs_f64().round() as u64;
     match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
         (0, 0, seconds) => format!("{seconds} s"),

@@ -1,7 +1,7 @@
 //! Progress of a suite: suite, experiment and run level, with the time left by what was measured.
 
 use super::progress::{ProgressMode, seconds};
-use crate::suite::plan::{Plan, PlannedRun};
+use crate::suite::plan::{Plan, PlannedRun, label};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -31,6 +31,18 @@ enum Shown {
     Nothing,
 }
 
+impl Shown {
+    fn new(mode: ProgressMode, bar: impl FnOnce() -> Self) -> Self {
+        match mode {
+            ProgressMode::Bar => bar(),
+            ProgressMode::Auto if std::io::stderr().is_terminal() => bar(),
+            ProgressMode::Auto | ProgressMode::Lines => Self::Lines,
+            ProgressMode::Json => Self::Json,
+            ProgressMode::None => Self::Nothing,
+        }
+    }
+}
+
 impl SuiteProgress {
     /// Starts the clock: of these runs, so many are not done.
     #[must_use]
@@ -45,7 +57,6 @@ impl SuiteProgress {
                 }
             }
         }
-        let terminal = std::io::stderr().is_terminal();
         let bar = || {
             let style = ProgressStyle::with_template("{bar:16} {pos}/{len} runs  {wide_msg}")
                 .expect("the template is well-formed");
@@ -56,13 +67,7 @@ impl SuiteProgress {
         };
         let steps_of_a_run = runs.first().map_or(0, |run| robot_steps(run));
         Self {
-            shown: match mode {
-                ProgressMode::Bar => bar(),
-                ProgressMode::Auto if terminal => bar(),
-                ProgressMode::Auto | ProgressMode::Lines => Shown::Lines,
-                ProgressMode::Json => Shown::Json,
-                ProgressMode::None => Shown::Nothing,
-            },
+            shown: Shown::new(mode, bar),
             started: Instant::now(),
             labels,
             runs: runs.len(),
@@ -147,6 +152,65 @@ impl SuiteProgress {
         let worked = self.worked.get().max(1);
         let left = self.to_work.saturating_sub(worked) as f64 / worked as f64;
         self.started.elapsed().mul_f64(left)
+    }
+}
+
+/// Shows runs beyond a plan, of which nobody knows how many there will be.
+#[derive(Debug)]
+pub struct SearchProgress {
+    shown: Shown,
+}
+
+impl SearchProgress {
+    /// For the experiment that searches.
+    #[must_use]
+    pub fn start(mode: ProgressMode, experiment: &str) -> Self {
+        let bar = || {
+            let style =
+                ProgressStyle::with_template("{prefix}: {pos} runs beyond the plan  {wide_msg}")
+                    .expect("the template is well-formed");
+            let bar = ProgressBar::no_length().with_style(style);
+            bar.set_prefix(experiment.to_owned());
+            bar.enable_steady_tick(Duration::from_millis(200));
+            Shown::Bar(bar)
+        };
+        Self {
+            shown: Shown::new(mode, bar),
+        }
+    }
+
+    /// A run begins, the so many-th beyond the plan.
+    pub fn begins(&self, run: &PlannedRun, number: u32, experiment: &str) {
+        let label = label(&run.settings);
+        match &self.shown {
+            Shown::Bar(bar) => {
+                bar.set_position(number.into());
+                bar.set_message(format!("{label}, seed {}", run.seed));
+            }
+            Shown::Lines => eprintln!(
+                "{experiment}: run {number} beyond the plan, {label}, seed {}",
+                run.seed
+            ),
+            Shown::Json => show_line!(
+                "{}",
+                serde_json::json!({
+                    "event": "further-run",
+                    "experiment": experiment,
+                    "number": number,
+                    "run": run.id,
+                    "label": label,
+                    "seed": run.seed,
+                })
+            ),
+            Shown::Nothing => {}
+        }
+    }
+
+    /// Clears the bar.
+    pub fn end(&self) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.finish_and_clear();
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A suite is a TOML file. Each experiment is the product of its lists: every sensor model on every
 //! grid, and so on, so many runs each. [`plan`] turns it into runs with names, [`work`] says which
-//! are done and does the others.
+//! are done and does the others, [`search`] evolves on where a structure is wanted that none has.
 //!
 //! ```toml
 //! name = "densities"
@@ -16,9 +16,11 @@
 
 pub mod plan;
 pub mod report;
+pub mod search;
 pub mod slurm;
 pub mod work;
 
+use minimal_surprise_sim::Structure;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -103,12 +105,15 @@ pub struct Resilience {
     pub name: String,
     /// The experiment.
     pub of: String,
-    /// The structure.
+    /// The structure, by its name in tables, or with dashes.
     pub structure: String,
     /// Robots in each of the areas.
     pub robots_in_areas: Vec<u32>,
     /// Runs of what is drawn at random.
     pub repeat: u32,
+    /// If no run of the experiment has the structure: so many runs more at most, until one has.
+    #[serde(default)]
+    pub further_runs: u32,
 }
 
 fn default_grids() -> Vec<String> {
@@ -164,6 +169,15 @@ pub enum SuiteError {
         /// What is wrong and what would be valid.
         problem: String,
     },
+}
+
+impl Resilience {
+    /// The structure; none if there is none of that name.
+    #[must_use]
+    pub fn structure(&self) -> Option<Structure> {
+        let spaced = self.structure.replace('-', " ");
+        Structure::ALL.into_iter().find(|s| s.name() == spaced)
+    }
 }
 
 impl Suite {
@@ -230,6 +244,13 @@ impl Suite {
                 return Err(invalid(name, problem));
             }
         }
+        for asked in &suite.resiliences {
+            if asked.structure().is_none() {
+                let names = Structure::ALL.map(Structure::name).join(", ");
+                let problem = format!("structure = {:?}: structures are {names}", asked.structure);
+                return Err(invalid(&asked.name, problem));
+            }
+        }
         Ok(suite)
     }
 }
@@ -275,6 +296,12 @@ mod tests {
         assert!(none.contains("runs = 0"), "{none}");
         let twice = error(&format!("{head}[[experiment]]\nname = \"one\"\nruns = 2\n"));
         assert!(twice.contains("two experiments"), "{twice}");
+        let damage = "[[resilience]]\nname = \"damage\"\nof = \"one\"\nstructure = \"hexagon\"\nrobots-in-areas = [3]\nrepeat = 2\n";
+        let hexagon = error(&format!("{head}{damage}"));
+        assert!(
+            hexagon.contains("hexagon") && hexagon.contains("triangular lattice"),
+            "{hexagon}"
+        );
         let of = "[[re-evaluation]]\nname = \"again\"\nof = [\"two\"]\nstarts = 3\n";
         assert!(error(&format!("{head}{of}")).contains("experiments are one"));
     }

@@ -54,7 +54,38 @@ pub struct PlannedRun {
     pub settings: Settings,
 }
 
+impl PlannedExperiment {
+    /// The runs after the planned ones: of all settings in turn, with the seeds that follow.
+    pub fn further(&self) -> impl Iterator<Item = PlannedRun> {
+        let rounds = if self.settings.is_empty() {
+            0
+        } else {
+            u32::MAX
+        };
+        (0..rounds).flat_map(|round| {
+            let settings = self.settings.iter();
+            settings.filter_map(move |settings| {
+                let last = settings.runs.last()?;
+                let seed = last.seed.checked_add(1)?.checked_add(round.into())?;
+                Some(PlannedRun::new(&last.settings, seed))
+            })
+        })
+    }
+}
+
 impl PlannedRun {
+    /// The run of some settings with another seed.
+    fn new(settings: &Settings, seed: u64) -> Self {
+        let mut settings = settings.clone();
+        settings.seed = seed;
+        settings.written.seed = seed;
+        Self {
+            id: id(&settings),
+            seed,
+            settings,
+        }
+    }
+
     /// Its directory below that of the suite.
     #[must_use]
     pub fn directory(&self, suite: &Path) -> PathBuf {
@@ -131,17 +162,8 @@ impl Plan {
 }
 
 fn planned(settings: &Settings, experiment: &Experiment, runs: Option<u32>) -> PlannedSettings {
-    let runs = (0..runs.unwrap_or(experiment.runs)).map(|run| {
-        let seed = experiment.first_seed + u64::from(run);
-        let mut settings = settings.clone();
-        settings.seed = seed;
-        settings.written.seed = seed;
-        PlannedRun {
-            id: id(&settings),
-            seed,
-            settings,
-        }
-    });
+    let runs = (0..runs.unwrap_or(experiment.runs))
+        .map(|run| PlannedRun::new(settings, experiment.first_seed + u64::from(run)));
     PlannedSettings {
         label: label(settings),
         runs: runs.collect(),

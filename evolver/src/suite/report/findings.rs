@@ -353,6 +353,17 @@ fn horizontal(gathered: &Gathered) -> Option<Finding> {
     )
 }
 
+/// The runs that were looked through, in words.
+pub(super) fn counted(resilient: &Resilient) -> String {
+    match resilient.further {
+        0 => format!("{} runs", resilient.looked_through),
+        further => format!(
+            "{} runs and {further} beyond the plan",
+            resilient.looked_through
+        ),
+    }
+}
+
 fn resilience(resilient: &Resilient) -> Vec<Finding> {
     let of_kind = |kind: &str| {
         let claim = format!(
@@ -364,8 +375,8 @@ fn resilience(resilient: &Resilient) -> Vec<Finding> {
             return Finding {
                 claim,
                 ours: format!(
-                    "none of {} runs is named after the structure",
-                    resilient.looked_through
+                    "none of {} is named after the structure",
+                    counted(resilient)
                 ),
                 test: "mean shares".into(),
                 p: None,

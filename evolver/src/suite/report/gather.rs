@@ -6,8 +6,10 @@ use crate::files;
 use crate::finished_run::{FinishedRun, ReadRunError};
 use crate::reevaluation::{ResilienceRow, mean, rerun, resilience};
 use crate::settings::Settings;
-use crate::suite::plan::{Plan, PlannedRun, PlannedSettings};
+use crate::suite::plan::{Plan, PlannedRun, PlannedSettings, label};
+use crate::suite::search::{Search, look};
 use crate::suite::{Reevaluation, Resilience, Suite};
+use crate::time_spent::TimeSpent;
 use minimal_surprise_controller::Controller;
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::structures::{LineCounts, LineOrientation, Structure, classify};
@@ -41,6 +43,8 @@ pub struct Run {
     pub average_prediction: Vec<f64>,
     /// Program, version and revision that did it.
     pub program: String,
+    /// How long it took.
+    pub time: TimeSpent,
 }
 
 impl Run {
@@ -209,6 +213,8 @@ pub struct Resilient {
     pub looked_through: usize,
     /// Those named after the structure.
     pub named: usize,
+    /// If none of them is: the runs beyond the plan that were looked through.
+    pub further: u32,
     /// None if there is no run of the structure.
     pub damaged: Option<Damaged>,
 }
@@ -222,6 +228,8 @@ pub struct Gathered {
     pub reevaluations: Vec<Reevaluated>,
     /// The resilience experiments.
     pub resiliences: Vec<Resilient>,
+    /// How long the runs took that were done beyond the plan.
+    pub further_time: TimeSpent,
 }
 
 impl Gathered {
@@ -243,16 +251,28 @@ impl Gathered {
                 reevaluations.push(reevaluate(asked, group)?);
             }
         }
-        let mut resiliences = Vec::new();
+        let mut resiliences: Vec<Resilient> = Vec::new();
+        let mut further_time = TimeSpent::default();
         for asked in &suite.resiliences {
-            if plan.experiments.iter().any(|e| e.name == asked.of) {
-                resiliences.push(damage(asked, &groups)?);
+            if let Some(experiment) = plan.experiments.iter().find(|e| e.name == asked.of) {
+                let resilient = damage(asked, &groups, plan, directory)?;
+                // Two searches through the same experiment share its runs.
+                let counted = resiliences.iter().filter(|r| r.asked.of == asked.of);
+                let counted = counted.map(|r| r.further).max().unwrap_or(0);
+                let further = experiment.further().take(resilient.further as usize);
+                for run in further.skip(counted as usize) {
+                    let time = files::read(&run.directory(directory).join("time.json"));
+                    let time = TimeSpent::of_json(&time.unwrap_or_default());
+                    further_time = further_time.and(time);
+                }
+                resiliences.push(resilient);
             }
         }
         Ok(Self {
             groups,
             reevaluations,
             resiliences,
+            further_time,
         })
     }
 
@@ -328,6 +348,8 @@ fn read_run(planned: &PlannedRun, directory: &Path) -> Result<Option<Run>, Repor
     };
     let state: FinalFile = json(&directory.join("final.json"))?;
     let meta: MetaFile = json(&directory.join("meta.json"))?;
+    // Nothing of what is said depends on it; a run of an older program has none.
+    let time = files::read(&directory.join("time.json")).unwrap_or_default();
     let path = directory.join("generations.csv");
     let best_fitness = csv::Reader::from_reader(files::read(&path)?.as_slice())
         .deserialize()
@@ -345,6 +367,7 @@ fn read_run(planned: &PlannedRun, directory: &Path) -> Result<Option<Run>, Repor
         intended_movement: state.measures.intended_movement,
         temperature: state.measures.temperature,
         average_prediction: state.average_prediction,
+        time: TimeSpent::of_json(&time),
         program: format!(
             "{} {}, revision {}",
             meta.program, meta.program_version, meta.revision
@@ -392,9 +415,15 @@ pub(super) fn structure_named(name: &str) -> Option<Structure> {
     Structure::ALL.into_iter().find(|s| s.name() == spaced)
 }
 
-fn damage(asked: &Resilience, groups: &[Group]) -> Result<Resilient, ReportError> {
-    let structure =
-        structure_named(&asked.structure).ok_or_else(|| ReportError::UnknownStructure {
+fn damage(
+    asked: &Resilience,
+    groups: &[Group],
+    plan: &Plan,
+    directory: &Path,
+) -> Result<Resilient, ReportError> {
+    let structure = asked
+        .structure()
+        .ok_or_else(|| ReportError::UnknownStructure {
             name: asked.structure.clone(),
         })?;
     let all: Vec<(&Group, &Run)> = groups
@@ -417,14 +446,26 @@ fn damage(asked: &Resilience, groups: &[Group]) -> Result<Resilient, ReportError
             best
         }
     });
-    let damaged = chosen
-        .map(|(group, run)| damage_run(asked, structure, group, run))
-        .transpose()?;
+    let (damaged, further) = match chosen {
+        Some((group, run)) => (Some(damage_run(asked, structure, &group.label, run)?), 0),
+        None => match look(plan, asked, directory, 0)? {
+            Search::Found(found, further) => {
+                let run = read_run(&found, &found.directory(directory))?;
+                let label = label(&found.settings);
+                let damaged = run.map(|run| damage_run(asked, structure, &label, &run));
+                (damaged.transpose()?, further)
+            }
+            Search::Next(_, next) => (None, next - 1),
+            Search::InVain(further) => (None, further),
+            Search::NotNeeded | Search::Waits => (None, 0),
+        },
+    };
     Ok(Resilient {
         asked: asked.clone(),
         structure,
         looked_through: all.len(),
         named: named.len(),
+        further,
         damaged,
     })
 }
@@ -432,7 +473,7 @@ fn damage(asked: &Resilience, groups: &[Group]) -> Result<Resilient, ReportError
 fn damage_run(
     asked: &Resilience,
     structure: Structure,
-    group: &Group,
+    label: &str,
     of: &Run,
 ) -> Result<Damaged, ReportError> {
     let finished = &of.finished;
@@ -477,7 +518,7 @@ fn damage_run(
         }
     };
     Ok(Damaged {
-        label: group.label.clone(),
+        label: label.to_owned(),
         run: of.clone(),
         initial,
         new_starts,

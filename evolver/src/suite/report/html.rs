@@ -243,24 +243,28 @@ fn cell(value: &Value) -> String {
 fn write_making(page: &mut String, report: &Report) {
     page.push_str(
         "<h2>How it was made</h2>\n<div class=\"wide\"><table><thead><tr><th>runs</th><th>seeds</th>\
-         <th>command and program</th><th>hash of the runs' hashes</th></tr></thead><tbody>\n",
+         <th>minutes, CPU / clock</th><th>command and program</th><th>hash of the runs' hashes</th></tr></thead><tbody>\n",
     );
     for making in &report.making {
         let _ = writeln!(
             page,
-            "<tr><td>{}: {}<small>{} of {}</small></td><td>{}</td><td><code>{}</code>\
+            "<tr><td>{}: {}<small>{} of {}</small></td><td>{}</td><td>{}</td><td><code>{}</code>\
              <small>{}</small></td><td><code>{}</code></td></tr>",
             escape(&making.experiment),
             escape(&making.setting),
             making.finished,
             making.planned,
             escape(&making.seeds),
+            making.minutes(),
             escape(&making.command),
             escape(&making.programs),
             making.hash
         );
     }
     page.push_str("</tbody></table></div>\n");
+    if let Some(time) = report.time_in_words() {
+        let _ = writeln!(page, "<p>{}</p>", escape(&time));
+    }
     if report.shares_runs {
         let _ = writeln!(page, "<p>{SHARED}</p>");
     }

@@ -44,20 +44,24 @@ pub fn text(report: &Report) -> String {
             figure.id
         );
     }
-    text += "\n## How it was made\n\n| experiment | setting | runs | seeds | command | program | hash of the runs' hashes |\n|---|---|---|---|---|---|---|\n";
+    text += "\n## How it was made\n\n| experiment | setting | runs | seeds | minutes, CPU / clock | command | program | hash of the runs' hashes |\n|---|---|---|---|---|---|---|---|\n";
     for making in &report.making {
         let _ = writeln!(
             text,
-            "| {} | {} | {} of {} | {} | `{}` | {} | `{}` |",
+            "| {} | {} | {} of {} | {} | {} | `{}` | {} | `{}` |",
             making.experiment,
             making.setting,
             making.finished,
             making.planned,
             making.seeds,
+            making.minutes(),
             making.command,
             making.programs,
             making.hash
         );
+    }
+    if let Some(time) = report.time_in_words() {
+        let _ = writeln!(text, "\n{time}");
     }
     if report.shares_runs {
         let _ = writeln!(text, "\n{}", super::html::SHARED);

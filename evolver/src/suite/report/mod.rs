@@ -19,6 +19,8 @@ use super::Suite;
 use super::plan::Plan;
 use crate::files::{self, FileError};
 use crate::finished_run::ReadRunError;
+use crate::report::progress::seconds;
+use crate::time_spent::TimeSpent;
 use figures::{Figure, FigureError};
 use findings::{Finding, Verdict};
 use gather::{Gathered, Group};
@@ -28,6 +30,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use tables::Table;
 
 /// What people found out about differences, in the report's folder.
@@ -109,6 +112,21 @@ pub struct Making {
     pub hash: String,
     /// The command that does them.
     pub command: String,
+    /// Seconds of computing, all threads together; 0 if it was not measured.
+    pub cpu_s: f64,
+    /// Seconds on the clock.
+    pub wall_s: f64,
+}
+
+impl Making {
+    /// Minutes of computing and on the clock, in words.
+    fn minutes(&self) -> String {
+        if self.cpu_s == 0.0 {
+            "–".to_owned()
+        } else {
+            format!("{:.1} / {:.1}", self.cpu_s / 60.0, self.wall_s / 60.0)
+        }
+    }
 }
 
 /// Everything that a report says.
@@ -132,6 +150,8 @@ pub struct Report {
     pub tables: Vec<Table>,
     /// The figures.
     pub figures: Vec<Figure>,
+    /// How long all runs took, each counted once.
+    pub time: TimeSpent,
     /// How it was made.
     pub making: Vec<Making>,
 }
@@ -218,15 +238,20 @@ impl Report {
             .iter()
             .filter(|group| !group.is_complete())
             .map(|group| format!("{}, {}: {}", group.experiment, group.label, group.counted()));
-        let ids = gathered
-            .groups
-            .iter()
-            .flat_map(|g| g.runs.iter().map(|run| &run.id));
         let mut seen = BTreeSet::new();
+        let (mut shares_runs, mut time) = (false, gathered.further_time);
+        for run in gathered.groups.iter().flat_map(|group| &group.runs) {
+            if seen.insert(&run.id) {
+                time = time.and(run.time);
+            } else {
+                shares_runs = true;
+            }
+        }
         Ok(Self {
             suite: suite.to_owned(),
             looked_into: Vec::new(),
-            shares_runs: !ids.into_iter().all(|id| seen.insert(id)),
+            shares_runs,
+            time,
             missing: missing.collect(),
             findings: findings::all(gathered, &paper),
             differences: differences(&tables),
@@ -242,6 +267,20 @@ impl Report {
                 .map(|group| making(group, suite))
                 .collect(),
             tables,
+        })
+    }
+
+    /// How long all runs took, in words; nothing if it was not measured.
+    fn time_in_words(&self) -> Option<String> {
+        let in_words = |s: f64| seconds(Duration::from_secs_f64(s));
+        (self.time.sittings > 0).then(|| {
+            format!(
+                "All runs took {} of computing and {} on the clock, summed over {} sittings of one \
+                 run each.",
+                in_words(self.time.cpu_s),
+                in_words(self.time.wall_s),
+                self.time.sittings
+            )
         })
     }
 
@@ -312,6 +351,8 @@ fn making(group: &Group, suite: &str) -> Making {
         .iter()
         .map(|byte| format!("{byte:02x}"))
         .collect();
+    let times = group.runs.iter().map(|run| run.time);
+    let time = times.fold(TimeSpent::default(), TimeSpent::and);
     let called = if suite == "paper" {
         "evolver paper".to_owned()
     } else {
@@ -334,6 +375,8 @@ fn making(group: &Group, suite: &str) -> Making {
             hash
         },
         command: format!("{called} run --only {}", group.experiment),
+        cpu_s: time.cpu_s,
+        wall_s: time.wall_s,
     }
 }
 

@@ -1,5 +1,6 @@
 //! The paper's tables with our numbers, the paper's, intervals and tests.
 
+use super::findings::counted;
 use super::gather::{Gathered, Group, Reevaluated, Resilient, Run, structure_named};
 use super::paper::{
     Distribution, GROUPING, MeanMedian, NONE, Of, PaperValues, StructureValues, is_grouping,
@@ -723,10 +724,16 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
     )];
     let mut rows = Vec::new();
     if let Some(damaged) = &resilient.damaged {
+        let chosen = match resilient.further {
+            0 => "Of these the one with the largest share was damaged".to_owned(),
+            further => format!(
+                "So evolution went on, of all settings in turn, and the first that is, run \
+                 {further} beyond the plan, was damaged"
+            ),
+        };
         notes.push(format!(
-            "Of these the one with the largest share was damaged: {}, seed {}. Means, medians in \
-             brackets. It is another genome than the paper's, so that the numbers need not be the \
-             same and are not tested.",
+            "{chosen}: {}, seed {}. Means, medians in brackets. It is another genome than the \
+             paper's, so that the numbers need not be the same and are not tested.",
             damaged.label, damaged.run.finished.settings.seed
         ));
         for area in &damaged.areas {
@@ -774,7 +781,10 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
             });
         }
     } else {
-        notes.push("There is none to damage yet; more runs are needed.".to_owned());
+        notes.push(format!(
+            "There is none to damage in {}; more runs are needed.",
+            counted(resilient)
+        ));
     }
     Table {
         id: if source.is_empty() {

@@ -1,0 +1,189 @@
+//! Searches: evolving on until a structure is there that a resilience experiment is about.
+//!
+//! The runs of the experiment come first. If none of them is named after the structure, the seeds
+//! that follow are run, of all settings in turn, until one is; its place in that order says how many
+//! it took, whoever has done them.
+
+use super::Resilience;
+use super::plan::{Plan, PlannedRun};
+use super::work::{Progress, progress};
+use crate::finished_run::{FinishedRun, ReadRunError};
+use minimal_surprise_sim::{Structure, classify};
+use std::path::Path;
+
+/// How far a search is.
+#[derive(Clone, Debug)]
+pub enum Search {
+    /// A planned run has the structure; or nothing was asked for.
+    NotNeeded,
+    /// Planned runs are not done yet.
+    Waits,
+    /// This run is to be done next, the so many-th beyond the plan, from 1.
+    Next(Box<PlannedRun>, u32),
+    /// This run has it, the so many-th beyond the plan, from 1.
+    Found(Box<PlannedRun>, u32),
+    /// So many runs beyond the plan were done, the most that were asked for, and none has it.
+    InVain(u32),
+}
+
+/// Looks through the files of a suite; of the runs beyond the plan, only those after so many, which
+/// are known not to have the structure.
+///
+/// # Errors
+/// [`ReadRunError`] if a finished run cannot be read.
+pub fn look(
+    plan: &Plan,
+    asked: &Resilience,
+    suite: &Path,
+    after: u32,
+) -> Result<Search, ReadRunError> {
+    let experiment = plan.experiments.iter().find(|e| e.name == asked.of);
+    let (Some(experiment), Some(structure), 1..) =
+        (experiment, asked.structure(), asked.further_runs)
+    else {
+        return Ok(Search::NotNeeded);
+    };
+    let mut waits = false;
+    let planned = experiment.settings.iter().flat_map(|s| &s.runs);
+    for run in planned.filter(|_| after == 0) {
+        match has(run, structure, suite)? {
+            Some(true) => return Ok(Search::NotNeeded),
+            Some(false) => {}
+            None => waits = true,
+        }
+    }
+    if waits {
+        return Ok(Search::Waits);
+    }
+    let further = (1..=asked.further_runs).zip(experiment.further());
+    for (number, run) in further.skip(after as usize) {
+        match has(&run, structure, suite)? {
+            Some(true) => return Ok(Search::Found(Box::new(run), number)),
+            Some(false) => {}
+            None => return Ok(Search::Next(Box::new(run), number)),
+        }
+    }
+    Ok(Search::InVain(asked.further_runs))
+}
+
+/// Whether a run is named after a structure; none if it is not done.
+fn has(run: &PlannedRun, structure: Structure, suite: &Path) -> Result<Option<bool>, ReadRunError> {
+    if progress(run, suite) != Progress::Done {
+        return Ok(None);
+    }
+    let finished = FinishedRun::read(&run.directory(suite))?;
+    let found = classify(run.settings.scenario.grid(), &finished.final_poses);
+    Ok(Some(
+        found.is_ok_and(|found| found.names().contains(&structure)),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::suite::work::{Worked, work_on};
+    use crate::suite::{Suite, plan::PlannedRun};
+    use std::collections::BTreeSet;
+    use std::sync::atomic::AtomicBool;
+
+    const RUNS: &str = "
+        name = \"own\"
+        [[experiment]]
+        name = \"two-grids\"
+        runs = 1
+        grids = [\"8x8\", \"9x9\"]
+        robots = [12]
+        population = 4
+        generations = 2
+        repetitions = 1
+        steps = 20
+    ";
+
+    fn suite(structure: &str, further_runs: u32) -> (Suite, Plan) {
+        let text = format!(
+            "{RUNS}\n[[resilience]]\nname = \"damage\"\nof = \"two-grids\"\nstructure = \
+             \"{structure}\"\nrobots-in-areas = [2]\nrepeat = 1\nfurther-runs = {further_runs}\n"
+        );
+        let suite = Suite::parse(Path::new("own.toml"), &text).unwrap();
+        let plan = Plan::new(&suite, None, None, false).unwrap();
+        (suite, plan)
+    }
+
+    fn done(run: &PlannedRun, directory: &Path) {
+        let worked = work_on(run, directory, &AtomicBool::new(false), |_| {});
+        assert_eq!(worked.unwrap(), Worked::Completed);
+    }
+
+    fn names(run: &PlannedRun, directory: &Path) -> Vec<Structure> {
+        let finished = FinishedRun::read(&run.directory(directory)).unwrap();
+        let grid = run.settings.scenario.grid();
+        classify(grid, &finished.final_poses).unwrap().names()
+    }
+
+    #[test]
+    fn a_search_goes_on_with_the_next_seeds_of_all_settings_until_one_has_the_structure() {
+        let scratch = tempfile::tempdir().unwrap();
+        let everywhere = scratch.path().join("everywhere");
+        let (_, plan) = suite("line", 1);
+        // What there is to find: the first run beyond the plan with something new in its name.
+        let mut known = BTreeSet::new();
+        for run in plan.runs() {
+            done(run, &everywhere);
+            known.extend(names(run, &everywhere).iter().map(|s| s.name()));
+        }
+        let mut further = (1..).zip(plan.experiments[0].further());
+        let (number, wanted, found) = further
+            .by_ref()
+            .take(200)
+            .find_map(|(number, run)| {
+                done(&run, &everywhere);
+                let names = names(&run, &everywhere);
+                let new = names.into_iter().find(|s| !known.contains(s.name()))?;
+                Some((number, new, run))
+            })
+            .expect("among 200 runs is something that the first two did not form");
+        let seeds: Vec<u64> = plan.experiments[0]
+            .further()
+            .take(4)
+            .map(|r| r.seed)
+            .collect();
+        assert_eq!(
+            seeds,
+            [2, 2, 3, 3],
+            "settings in turn, seeds after the planned"
+        );
+
+        let directory = scratch.path().join("searched");
+        let (asking, plan) = suite(wanted.name(), number);
+        let asked = &asking.resiliences[0];
+        assert!(matches!(
+            look(&plan, asked, &directory, 0).unwrap(),
+            Search::Waits
+        ));
+        plan.runs()
+            .into_iter()
+            .for_each(|run| done(run, &directory));
+        for expected in 1..=number {
+            match look(&plan, asked, &directory, expected - 1).unwrap() {
+                Search::Next(run, next) if next == expected => done(&run, &directory),
+                other => panic!("run {expected} beyond the plan is next, not {other:?}"),
+            }
+        }
+        match look(&plan, asked, &directory, 0).unwrap() {
+            Search::Found(run, taken) => assert_eq!((run.id, taken), (found.id, number)),
+            other => panic!("{wanted} is in run {number} beyond the plan, not {other:?}"),
+        }
+        if number > 1 {
+            let (less, plan) = suite(wanted.name(), number - 1);
+            let looked = look(&plan, &less.resiliences[0], &directory, 0).unwrap();
+            assert!(matches!(looked, Search::InVain(n) if n == number - 1));
+        }
+        let (_, plan) = suite(wanted.name(), 0);
+        let none = Resilience {
+            further_runs: 0,
+            ..asked.clone()
+        };
+        let looked = look(&plan, &none, &directory, 0).unwrap();
+        assert!(matches!(looked, Search::NotNeeded), "none was asked for");
+    }
+}
