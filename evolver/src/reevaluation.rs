@@ -92,6 +92,22 @@ pub fn resilience(
         .map(|start| (*conditions, conditions.reevaluation(seeds, start)))
         .collect();
     let starts = row("new starts", starts)?;
+    let damaged = after_damage(finished, structure, damage, repeat)?;
+    Ok(vec![initial, starts, damaged])
+}
+
+/// The row of [`resilience`] that is about the damage.
+///
+/// # Errors
+/// [`DamageError`] if the area or what is left of the swarm cannot be run.
+pub fn after_damage(
+    finished: &FinishedRun,
+    structure: Structure,
+    damage: Damage,
+    repeat: u32,
+) -> Result<ResilienceRow, DamageError> {
+    let conditions = &finished.settings.scenario;
+    let seeds = SeedTree::new(finished.settings.seed);
     let (name, times) = match damage {
         Damage::Remove(_) if conditions.noise().is_none() => ("remove", 1),
         Damage::Remove(_) => ("remove", repeat),
@@ -99,8 +115,8 @@ pub fn resilience(
     };
     let damaged = (0..times)
         .map(|repetition| damage.trial(conditions, &finished.final_poses, seeds, repetition))
-        .collect::<Result<_, _>>()?;
-    Ok(vec![initial, starts, row(name, damaged)?])
+        .collect::<Result<Vec<_>, _>>()?;
+    resilience_row(finished, structure, name, &damaged)
 }
 
 fn resilience_row(

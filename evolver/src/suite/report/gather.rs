@@ -4,7 +4,7 @@ use super::ReportError;
 use super::damage_areas::{Rectangle, smallest_apart};
 use crate::files;
 use crate::finished_run::{FinishedRun, ReadRunError};
-use crate::reevaluation::{ResilienceRow, mean, rerun, resilience};
+use crate::reevaluation::{ResilienceRow, after_damage, mean, rerun, resilience};
 use crate::settings::Settings;
 use crate::suite::plan::{Plan, PlannedRun, PlannedSettings, label};
 use crate::suite::search::{Search, look};
@@ -202,6 +202,21 @@ impl Damaged {
     }
 }
 
+/// What became of all runs of a structure that were damaged as the chosen one was.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Overall {
+    /// Areas of all runs.
+    pub areas: usize,
+    /// Those after whose removal the share at the end was at least that at the start.
+    pub removal_holds: usize,
+    /// The same after repositioning, of the mean shares.
+    pub repositioning_holds: usize,
+    /// Mean gain from start to end after a removal, 0 to 1.
+    pub removal_gain: f64,
+    /// The same after repositioning.
+    pub repositioning_gain: f64,
+}
+
 /// A resilience experiment.
 #[derive(Clone, Debug)]
 pub struct Resilient {
@@ -217,6 +232,8 @@ pub struct Resilient {
     pub further: u32,
     /// None if there is no run of the structure.
     pub damaged: Option<Damaged>,
+    /// All planned runs that are named after the structure.
+    pub overall: Overall,
 }
 
 /// Everything that a report is about.
@@ -467,7 +484,39 @@ fn damage(
         named: named.len(),
         further,
         damaged,
+        overall: overall(asked, structure, named.iter().map(|(_, run)| *run))?,
     })
+}
+
+fn overall<'a>(
+    asked: &Resilience,
+    structure: Structure,
+    runs: impl Iterator<Item = &'a Run>,
+) -> Result<Overall, ReportError> {
+    let mut all = Overall::default();
+    for run in runs {
+        let finished = &run.finished;
+        let grid = finished.settings.scenario.grid();
+        let found = smallest_apart(grid, &finished.final_poses, &asked.robots_in_areas);
+        for Rectangle { x0, y0, x1, y1 } in found.into_iter().flatten() {
+            let area = Area::new(grid, x0, y0, x1, y1)?;
+            let gain = |damage| {
+                let row = after_damage(finished, structure, damage, asked.repeat)?;
+                Ok::<_, ReportError>(regained(&row))
+            };
+            let removal = gain(Damage::Remove(area))?;
+            let repositioning = gain(Damage::Reposition(area))?;
+            all.areas += 1;
+            all.removal_holds += usize::from(removal >= 0.0);
+            all.repositioning_holds += usize::from(repositioning >= 0.0);
+            all.removal_gain += removal;
+            all.repositioning_gain += repositioning;
+        }
+    }
+    let areas = all.areas.max(1) as f64;
+    all.removal_gain /= areas;
+    all.repositioning_gain /= areas;
+    Ok(all)
 }
 
 fn damage_run(

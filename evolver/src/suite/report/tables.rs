@@ -736,6 +736,20 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
              paper's, so that the numbers need not be the same and are not tested.",
             damaged.label, damaged.run.finished.settings.seed
         ));
+        let all = resilient.overall;
+        if all.areas > 0 {
+            notes.push(format!(
+                "All {} runs damaged likewise, {} areas: the share at the end is at least that at \
+                 the start after {} removals (mean change {:+.1} points) and after repositioning \
+                 from {} areas ({:+.1} points).",
+                resilient.named,
+                all.areas,
+                all.removal_holds,
+                100.0 * all.removal_gain,
+                all.repositioning_holds,
+                100.0 * all.repositioning_gain
+            ));
+        }
         for area in &damaged.areas {
             let r = area.rectangle;
             notes.push(format!(
