@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 pub struct SuiteProgress {
     shown: Shown,
     started: Instant,
-    /// Label of each run: its experiment and settings.
+    /// Label of each run: its place in the experiment, its settings and seed.
     labels: BTreeMap<String, String>,
     runs: usize,
     done_before: usize,
@@ -49,12 +49,15 @@ impl SuiteProgress {
     pub fn start(mode: ProgressMode, plan: &Plan, runs: &[&PlannedRun], waiting: usize) -> Self {
         let mut labels = BTreeMap::new();
         for experiment in &plan.experiments {
-            for settings in &experiment.settings {
-                for run in &settings.runs {
-                    let label =
-                        format!("{}: {}, seed {}", experiment.name, settings.label, run.seed);
-                    labels.entry(run.id.clone()).or_insert(label);
-                }
+            let settings = experiment.settings.iter();
+            let all = settings.flat_map(|s| s.runs.iter().map(move |run| (s, run)));
+            let total = all.clone().count();
+            for ((settings, run), place) in all.zip(1..) {
+                let label = format!(
+                    "{} {place}/{total}: {}, seed {}",
+                    experiment.name, settings.label, run.seed
+                );
+                labels.entry(run.id.clone()).or_insert(label);
             }
         }
         let bar = || {
