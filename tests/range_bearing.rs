@@ -59,6 +59,15 @@ fn a_scan_is_read_as_documented_to_the_byte() {
     });
     assert_eq!(feed(&frame(&bytes)), (1, expected.to_vec()));
     assert_eq!(message(&[(258, 1 << 14), (100, -3 << 13)]), bytes);
+    let words = frame(&bytes)
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect::<Vec<_>>();
+    let page = include_str!("../docs/robot.md");
+    assert!(
+        page.lines().any(|line| line == words.join(" ")),
+        "{words:?}"
+    );
     let (_, behind) = feed(&frame(&message(&[(1, i16::MIN)])));
     assert_eq!(behind[0].bearing_rad, -PI);
 }

@@ -28,3 +28,17 @@ fn the_program_ends_where_the_slots_begin() {
     let end = origin + (kib.parse::<u32>().unwrap() << 10);
     assert_eq!((origin, end), (FLASH_ADDRESS, SLOT_0_ADDRESS));
 }
+
+#[test]
+fn the_page_on_the_robot_names_these_places() {
+    let page = include_str!("../docs/robot.md");
+    for (what, address) in [
+        ("program", FLASH_ADDRESS),
+        ("slot 0", SLOT_0_ADDRESS),
+        ("slot 1", SLOT_1_ADDRESS),
+    ] {
+        let row = |line: &&str| line.starts_with(&format!("| `{address:#010x}` |"));
+        let row = page.lines().find(row);
+        assert!(row.is_some_and(|row| row.contains(what)), "{what}: {row:?}");
+    }
+}
