@@ -2,7 +2,7 @@
 
 use embedded_storage::nor_flash::NorFlash;
 use firmware_example::memory_flash::MemoryFlash;
-use firmware_example::stm32f4::SLOT_1_ADDRESS;
+use firmware_example::stm32f4::{SLOT_0_ADDRESS, SLOT_1_ADDRESS};
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_slots::{Buffer, InUse, Slot, Slots};
 use serde_json::Value;
@@ -563,6 +563,10 @@ fn an_exported_slot_is_run_by_a_robot_and_goes_where_its_board_has_slots() {
              --base-address {SLOT_1_ADDRESS:#010x} old.bin\n"
         )
     );
+    let help = evolver.run(&["export", "--help"]).stdout;
+    for address in [SLOT_0_ADDRESS, SLOT_1_ADDRESS] {
+        assert!(help.contains(&format!("{address:#010x}")), "{help}");
+    }
     let exported = export("new.bin --write-count 7");
     assert_eq!(exported.code, Some(0), "{exported:?}");
 
