@@ -68,7 +68,7 @@ component clippy clippy rust-web-clippy || clippy=0
 if [ $rustfmt = 1 ]; then
     say 'format'
     cargo fmt --all --check
-    cargo fmt --manifest-path firmware-example/Cargo.toml --check
+    cargo fmt --manifest-path firmware-example/Cargo.toml --all --check
 fi
 
 if [ $clippy = 1 ]; then
@@ -80,7 +80,8 @@ if [ $clippy = 1 ]; then
     else
         (cd firmware-example &&
             ../scripts/thumb-cargo.sh clippy --locked -- -D warnings &&
-            ../scripts/thumb-cargo.sh clippy --locked --package probe -- -D warnings)
+            ../scripts/thumb-cargo.sh clippy --locked --package probe -- -D warnings &&
+            ../scripts/thumb-cargo.sh clippy --locked --package robot-stm32f4 -- -D warnings)
     fi
 fi
 
@@ -103,6 +104,11 @@ for features in '' minimal-surprise-slots/defmt,minimal-surprise-link/defmt; do
     scripts/thumb-cargo.sh build --locked --release --package minimal-surprise-slots \
         --package minimal-surprise-link --features "$features" --target thumbv7em-none-eabihf
 done
+
+say "the robot's firmware for both of its boards"
+(cd firmware-example &&
+    ../scripts/thumb-cargo.sh build --locked --release --bin robot &&
+    ../scripts/thumb-cargo.sh build --locked --release --package robot-stm32f4)
 
 say 'packages'
 cargo package --locked --workspace --exclude tests --allow-dirty --no-verify

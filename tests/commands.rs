@@ -1,5 +1,10 @@
 //! The commands that look at what has evolved, run as a user would run them.
 
+use embedded_storage::nor_flash::NorFlash;
+use firmware_example::memory_flash::MemoryFlash;
+use firmware_example::stm32f4::{SLOT_0_ADDRESS, SLOT_1_ADDRESS};
+use minimal_surprise_controller::EncodedGenome;
+use minimal_surprise_slots::{Buffer, InUse, Slot, Slots};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -541,6 +546,54 @@ fn an_exported_genome_goes_to_a_chip_raw_or_as_intel_hex() {
 }
 
 #[test]
+fn an_exported_slot_is_run_by_a_robot_and_goes_where_its_board_has_slots() {
+    let evolver = with_a_run(&[]);
+    let container = evolver.read("run/best.genome");
+    let export = |more: &str| {
+        let arguments = ["export", "run/best.genome", "--format", "slot", "--out"];
+        let arguments = arguments.into_iter().chain(more.split(' '));
+        evolver.run(&arguments.collect::<Vec<_>>())
+    };
+    let exported = export("old.bin");
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+    assert_eq!(
+        exported.stderr,
+        format!(
+            "probe-rs download --chip STM32F407VGTx --binary-format bin \
+             --base-address {SLOT_1_ADDRESS:#010x} old.bin\n"
+        )
+    );
+    let help = evolver.run(&["export", "--help"]).stdout;
+    for address in [SLOT_0_ADDRESS, SLOT_1_ADDRESS] {
+        assert!(help.contains(&format!("{address:#010x}")), "{help}");
+    }
+    let exported = export("new.bin --write-count 7");
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+
+    let mut flash = MemoryFlash::new();
+    let second = MemoryFlash::ERASE_SIZE as u32;
+    for (at, file) in [(second, "old.bin"), (0, "new.bin")] {
+        let mut bytes = evolver.read(file);
+        bytes.resize(bytes.len().next_multiple_of(MemoryFlash::WRITE_SIZE), 0xff);
+        flash.write(at, &bytes).unwrap();
+        let mut room = Buffer::new();
+        let mut slots = Slots::open(&mut flash, 0, &mut room).unwrap();
+        let (slot, header) = slots.newest().unwrap();
+        let expected = if at == 0 {
+            (Slot::First, 7)
+        } else {
+            (Slot::Second, 1)
+        };
+        assert_eq!((slot, header.write_count), expected);
+        let genome = EncodedGenome::decode(&container).unwrap();
+        let InUse::Slot { genome: found, .. } = slots.in_use(&mut room) else {
+            panic!("{file} is not run");
+        };
+        assert!(found.weights().eq(genome.weights()));
+    }
+}
+
+#[test]
 fn export_refuses_what_is_no_genome_and_where_it_does_not_fit() {
     let evolver = with_a_run(&[]);
     evolver.write("damaged.genome", &evolver.read("run/best.genome")[..500]);
@@ -550,7 +603,7 @@ fn export_refuses_what_is_no_genome_and_where_it_does_not_fit() {
         assert_refused(&evolver.run(&arguments), words);
         assert_eq!(evolver.files(), before);
     };
-    for format in ["bin", "c", "rust", "hex"] {
+    for format in ["bin", "c", "rust", "hex", "slot"] {
         refused(
             &format!("export damaged.genome --format {format} --out out"),
             &["damaged.genome", "too short"],
@@ -563,6 +616,10 @@ fn export_refuses_what_is_no_genome_and_where_it_does_not_fit() {
     refused(
         "export run/best.genome --format bin --address flash --out out",
         &["--address = flash", "as in 0x080e0000"],
+    );
+    refused(
+        "export run/best.genome --format slot --write-count 0 --out out",
+        &["--write-count = 0", "from 1 to 4294967295"],
     );
     refused(
         "export run/best.genome --format trajectory",

@@ -1,13 +1,27 @@
 //! The robot's control loop on a board that only remembers: it is safe by itself.
 
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use firmware_example::memory_flash::MemoryFlash;
 use firmware_example::robot::{Board, DATA_PERIODS_MAX, Motion, NEIGHBOURS_MAX, Robot};
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, Provenance, encode};
 use minimal_surprise_controller::neighbours::{Detection, Neighbours};
 use minimal_surprise_controller::{Genome, Topology};
-use minimal_surprise_link::{Client, Report, Request};
-use minimal_surprise_slots::{Buffer, Slots};
+use minimal_surprise_link::{CHUNK_BYTES_MAX, Client, Report, Request};
+use minimal_surprise_slots::{Buffer, Slots, crc_of};
+use std::cell::RefCell;
 use std::collections::VecDeque;
+use std::rc::Rc;
+
+/// What the robot has done to its board and its flash, in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Event {
+    Drive(Motion),
+    Erase,
+    Write,
+    FeedWatchdog,
+}
+
+type Events = Rc<RefCell<Vec<Event>>>;
 
 #[derive(Debug, Default)]
 struct TestBoard {
@@ -16,7 +30,14 @@ struct TestBoard {
     arriving: VecDeque<u8>,
     period: bool,
     motion: Option<Motion>,
-    feeds: u32,
+    events: Events,
+}
+
+impl TestBoard {
+    /// What has happened since the last call.
+    fn events(&mut self) -> Vec<Event> {
+        self.events.take()
+    }
 }
 
 impl Board for TestBoard {
@@ -34,6 +55,7 @@ impl Board for TestBoard {
 
     fn drive(&mut self, motion: Motion) {
         self.motion = Some(motion);
+        self.events.borrow_mut().push(Event::Drive(motion));
     }
 
     fn receive(&mut self) -> Option<u8> {
@@ -51,7 +73,7 @@ impl Board for TestBoard {
     fn sleep(&mut self) {}
 
     fn feed_watchdog(&mut self) {
-        self.feeds += 1;
+        self.events.borrow_mut().push(Event::FeedWatchdog);
     }
 
     fn restarted_by_watchdog(&self) -> bool {
@@ -61,8 +83,55 @@ impl Board for TestBoard {
     fn log(&mut self, _: &Report) {}
 }
 
-/// A robot whose genome always goes straight: all action weights pull the output below zero.
-fn robot_that_goes_straight() -> Robot<TestBoard, MemoryFlash> {
+/// Flash that remembers when it was touched.
+#[derive(Debug, Default)]
+struct TestFlash {
+    memory: MemoryFlash,
+    events: Events,
+}
+
+impl ErrorType for TestFlash {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for TestFlash {
+    const READ_SIZE: usize = MemoryFlash::READ_SIZE;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        self.memory.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.memory.capacity()
+    }
+}
+
+impl NorFlash for TestFlash {
+    const WRITE_SIZE: usize = MemoryFlash::WRITE_SIZE;
+    const ERASE_SIZE: usize = MemoryFlash::ERASE_SIZE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
+        self.events.borrow_mut().push(Event::Erase);
+        self.memory.erase(from, to)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+        self.events.borrow_mut().push(Event::Write);
+        self.memory.write(offset, bytes)
+    }
+}
+
+type TestRobot = Robot<TestBoard, TestFlash>;
+
+fn start(memory: MemoryFlash) -> TestRobot {
+    let board = TestBoard::default();
+    let events = Rc::clone(&board.events);
+    Robot::start(board, TestFlash { memory, events }, 0).unwrap()
+}
+
+/// The container of a genome that always goes straight: all action weights pull the output below
+/// zero.
+fn straight() -> Vec<u8> {
     let topology = Topology::default();
     let shape = topology.action_shape();
     let (inputs, hidden) = (shape.inputs(), shape.hidden());
@@ -79,14 +148,23 @@ fn robot_that_goes_straight() -> Robot<TestBoard, MemoryFlash> {
     let genome = Genome::from_weights(topology, weights.collect::<Vec<i16>>().as_slice()).unwrap();
     let mut container = [0; CONTAINER_BYTES_MAX];
     let bytes = encode(&genome, Provenance::default(), &mut container).unwrap();
+    bytes.to_vec()
+}
+
+fn robot_that_goes_straight() -> TestRobot {
     let mut room = Buffer::new();
     let mut slots = Slots::open(MemoryFlash::new(), 0, &mut room).unwrap();
-    slots.write(bytes, &mut room).unwrap();
-    Robot::start(TestBoard::default(), slots.release(), 0).unwrap()
+    slots.write(&straight(), &mut room).unwrap();
+    start(slots.release())
+}
+
+/// A robot without a genome, which turns clockwise.
+fn robot_that_turns() -> TestRobot {
+    start(MemoryFlash::new())
 }
 
 /// Sends requests of a new session.
-fn ask(robot: &mut Robot<TestBoard, MemoryFlash>, session: u32, requests: &[Request<'_>]) {
+fn ask(robot: &mut TestRobot, session: u32, requests: &[Request<'_>]) {
     for index in 0..=requests.len() {
         let mut client = Client::new(session, 1);
         let mut frame = client.request(&Request::Identify).unwrap().to_vec();
@@ -102,7 +180,7 @@ fn ask(robot: &mut Robot<TestBoard, MemoryFlash>, session: u32, requests: &[Requ
     }
 }
 
-fn period(robot: &mut Robot<TestBoard, MemoryFlash>, reading: Option<bool>) -> Option<Motion> {
+fn period(robot: &mut TestRobot, reading: Option<bool>) -> Option<Motion> {
     let board = robot.board();
     board.reading = reading;
     board.period = true;
@@ -135,12 +213,80 @@ fn a_robot_never_drives_into_an_occupied_cell_or_one_it_knows_nothing_about() {
 }
 
 #[test]
-fn the_watchdog_is_fed_once_a_period_and_not_in_between() {
-    let mut robot = robot_that_goes_straight();
-    for fed in 1..5 {
-        period(&mut robot, Some(false));
-        robot.go_round();
-        robot.go_round();
-        assert_eq!(robot.board().feeds, fed);
+fn a_robot_that_turns_stands_too_once_its_data_are_older_than_two_periods() {
+    let mut robot = robot_that_turns();
+    ask(&mut robot, 1, &[Request::Start]);
+    for _ in 0..3 {
+        assert_eq!(period(&mut robot, Some(true)), Some(Motion::Right));
+        for _ in 0..DATA_PERIODS_MAX {
+            assert_eq!(period(&mut robot, None), Some(Motion::Right));
+        }
+        for _ in 0..3 {
+            assert_eq!(period(&mut robot, None), Some(Motion::Stop));
+        }
     }
+}
+
+#[test]
+fn the_motors_are_stopped_before_flash_is_erased_and_stand_while_it_is_written() {
+    let container = straight();
+    let begin = Request::Begin {
+        length: container.len().try_into().unwrap(),
+        crc: crc_of(&container).unwrap(),
+    };
+    let mut requests = vec![begin];
+    for (index, data) in container.chunks(CHUNK_BYTES_MAX).enumerate() {
+        let offset = (index * CHUNK_BYTES_MAX) as u16;
+        requests.push(Request::Chunk { offset, data });
+    }
+    requests.push(Request::Commit);
+
+    let mut robot = robot_that_turns();
+    ask(&mut robot, 1, &[Request::Start]);
+    assert_eq!(period(&mut robot, Some(false)), Some(Motion::Right));
+    robot.board().events();
+    // Refused, as the robot runs.
+    ask(&mut robot, 2, &requests);
+    assert_eq!(robot.board().events(), []);
+
+    ask(&mut robot, 3, &[Request::Stop]);
+    assert_eq!(robot.board().events(), [Event::Drive(Motion::Stop)]);
+    ask(&mut robot, 4, &requests);
+    let events = robot.board().events();
+    assert_eq!(events[..2], [Event::Drive(Motion::Stop), Event::Erase]);
+    let written = &events[2..];
+    assert!(written.len() > requests.len(), "{written:?}");
+    assert!(
+        written.iter().all(|event| *event == Event::Write),
+        "{written:?}"
+    );
+    // It was the update of a genome that goes straight.
+    ask(&mut robot, 5, &[Request::Start]);
+    assert_eq!(period(&mut robot, Some(false)), Some(Motion::Ahead));
+}
+
+#[test]
+fn the_watchdog_is_fed_at_the_end_of_a_period_and_not_in_between() {
+    let mut robot = robot_that_goes_straight();
+    ask(&mut robot, 1, &[Request::Start]);
+    robot.board().events();
+    for _ in 0..4 {
+        period(&mut robot, Some(false));
+        let expected = [Event::Drive(Motion::Ahead), Event::FeedWatchdog];
+        assert_eq!(robot.board().events(), expected);
+        robot.go_round();
+        robot.go_round();
+        assert_eq!(robot.board().events(), []);
+    }
+}
+
+#[test]
+fn talking_does_not_feed_the_watchdog() {
+    let mut robot = robot_that_goes_straight();
+    robot.board().events();
+    for session in 1..20 {
+        let requests = [Request::Identify, Request::Reset, Request::Telemetry];
+        ask(&mut robot, session, &requests);
+    }
+    assert_eq!(robot.board().events(), []);
 }

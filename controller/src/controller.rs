@@ -105,13 +105,18 @@ impl Controller {
 
     #[inline(never)]
     fn build(topology: Topology, weights: &mut dyn Iterator<Item = i16>) -> Self {
-        Self {
+        let mut controller = Self {
             topology,
-            action: ActionNetwork::from_weights(topology.action_shape(), weights),
-            prediction: topology
-                .prediction_shape()
-                .map(|shape| PredictionNetwork::from_weights(shape, weights)),
+            action: ActionNetwork::zeroed(topology.action_shape()),
+            prediction: None,
+        };
+        // In place: a network that is returned is copied, and stacks are small.
+        controller.action.read_weights(weights);
+        if let Some(shape) = topology.prediction_shape() {
+            let network = PredictionNetwork::zeroed(shape);
+            controller.prediction.insert(network).read_weights(weights);
         }
+        controller
     }
 
     /// One control step: scores the last prediction against `sensors`, decides on an action with

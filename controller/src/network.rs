@@ -177,26 +177,30 @@ pub type PredictionNetwork = Network<MAX_HIDDEN, MAX_OUTPUTS>;
 impl<const H: usize, const O: usize> Network<H, O> {
     const TERMS_ARE_EXACT: () = assert!(H <= MAX_TERMS && O <= 16, "more than 16 terms in a sum");
 
-    /// Takes the shape's weights, in genome order, from `weights`; weights that it does not
-    /// deliver are zero, those beyond the shape stay in it. Neurons beyond `H` and `O` are left out.
-    pub(crate) fn from_weights(shape: Shape, weights: &mut dyn Iterator<Item = i16>) -> Self {
+    /// A network all of whose rows are zero.
+    #[inline]
+    pub(crate) const fn zeroed(shape: Shape) -> Self {
         let () = Self::TERMS_ARE_EXACT;
-        let mut network = Self {
+        Self {
             shape,
             input: Aligned([[[0; 2]; 4]; MAX_TERMS / 2]),
             hidden: Aligned([[0; MAX_TERMS]; H]),
             output: Aligned([[0; H]; O]),
-        };
-        let output = network.output.0.as_flattened_mut();
+        }
+    }
+
+    /// Takes the shape's weights, in genome order, from `weights`; weights that it does not
+    /// deliver are zero, those beyond the shape stay in it. Neurons beyond `H` and `O` are left
+    /// out. The network must have been zero.
+    pub(crate) fn read_weights(&mut self, weights: &mut dyn Iterator<Item = i16>) {
         read_weights(
-            shape,
+            self.shape,
             weights,
-            &mut network.input.0,
-            &mut network.hidden.0,
-            output,
+            &mut self.input.0,
+            &mut self.hidden.0,
+            self.output.0.as_flattened_mut(),
             H,
         );
-        network
     }
 
     /// The network's sizes.
@@ -363,6 +367,15 @@ const _: () = assert!(ONE_Q3_12 as i32 == 1 << FRACTION_BITS);
 mod tests {
     use super::*;
 
+    fn network<const H: usize, const O: usize>(
+        shape: Shape,
+        weights: &mut dyn Iterator<Item = i16>,
+    ) -> Network<H, O> {
+        let mut network = Network::zeroed(shape);
+        network.read_weights(weights);
+        network
+    }
+
     #[test]
     fn more_than_sixteen_terms_cannot_be_built() {
         assert!(Shape::new(15, 14, 14, true).is_ok());
@@ -389,7 +402,7 @@ mod tests {
         // One input (w = 1, θ = 0.5), one hidden neuron (W = 2, r = −1), one output (V = 1).
         let shape = Shape::new(1, 1, 1, true).unwrap();
         let mut weights = [4096, 2048, 8192, -4096, 4096].into_iter();
-        let network = Network::<1, 1>::from_weights(shape, &mut weights);
+        let network = network::<1, 1>(shape, &mut weights);
         let u1 = activate(2048);
         assert_eq!(network.input_levels()[0], [-u1, u1]);
 
@@ -406,7 +419,7 @@ mod tests {
     #[test]
     fn an_output_of_exactly_zero_counts_as_not_negative() {
         let shape = Shape::new(1, 1, 1, false).unwrap();
-        let network = Network::<1, 1>::from_weights(shape, &mut core::iter::empty());
+        let network = network::<1, 1>(shape, &mut core::iter::empty());
         assert_eq!(network.forward(0, &mut Aligned([0])), 1);
     }
 
@@ -414,8 +427,7 @@ mod tests {
     fn the_largest_sums_are_exact() {
         let shape = Shape::new(15, 14, 14, true).unwrap();
         for weight in [32767, -32767] {
-            let network: PredictionNetwork =
-                Network::from_weights(shape, &mut core::iter::repeat(weight));
+            let network: PredictionNetwork = network(shape, &mut core::iter::repeat(weight));
             let mut hidden = Aligned([4096; MAX_HIDDEN]);
             network.forward(0x7fff, &mut hidden);
             let mut hidden = Aligned([-4096; MAX_HIDDEN]);

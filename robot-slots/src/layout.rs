@@ -54,6 +54,18 @@ impl Header {
         block_of(header)
     }
 
+    /// What precedes the container in a slot that was committed, for those who write a whole slot
+    /// at once: the header and its commit record.
+    #[must_use]
+    pub fn front(self) -> [u8; CONTAINER_AT as usize] {
+        let mut front = [0xff; CONTAINER_AT as usize];
+        let bytes = self.to_block().into_iter().chain(self.commit_block());
+        for (place, byte) in front.iter_mut().zip(bytes) {
+            *place = byte;
+        }
+        front
+    }
+
     /// The header in a block, if there is one.
     pub(crate) fn from_block(block: &Block) -> Option<Self> {
         let (magic, rest) = block.split_first_chunk()?;
@@ -124,6 +136,7 @@ mod tests {
         let mut commit = [0xff; 32];
         commit[..8].copy_from_slice(&COMMIT);
         assert_eq!(HEADER.commit_block(), commit);
+        assert_eq!(HEADER.front().as_slice(), [header, commit].concat());
     }
 
     /// Worked out by another program.

@@ -68,12 +68,12 @@ pub struct Linked {
     pub messages: String,
 }
 
-/// Links a program of the package `probe` in release.
+/// Links a program of a package in `firmware-example` in release.
 ///
 /// # Errors
 /// [`Missing`] if there is no compiler for the target.
-pub fn link_probe(program: &str) -> Result<Linked, Missing> {
-    cargo_build(&["--package", "probe", "--bin", program])
+pub fn link(package: &str, program: &str) -> Result<Linked, Missing> {
+    cargo_build(&["--package", package, "--bin", program])
 }
 
 /// Bytes of flash that a linked program takes: its sections that are loaded.

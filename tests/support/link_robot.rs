@@ -1,11 +1,12 @@
 //! A robot behind a line, without wheels: slots in a mock flash and a controller.
 
 use crate::flash::MockFlash;
+use firmware_example::robot::{genome_in_use, refusal};
 use minimal_surprise_controller::{
     Action, Controller, Decision, KERNEL_ID, KernelId, SensorBits, State, Turn,
 };
-use minimal_surprise_link::{Faults, GenomeInUse, Handler, Identity, Refusal, Report, Stepped};
-use minimal_surprise_slots::{Buffer, Defect, Slots, UpdateError};
+use minimal_surprise_link::{Faults, Handler, Identity, Refusal, Report, Stepped};
+use minimal_surprise_slots::{Buffer, Slots};
 
 /// Its flash.
 pub type Flash = MockFlash<4, 4096>;
@@ -89,39 +90,13 @@ impl LinkRobot {
     }
 }
 
-/// What a robot tells the host about an update that failed.
-fn refusal<E: core::fmt::Debug>(error: UpdateError<E>) -> Refusal {
-    match error {
-        UpdateError::ImpossibleLength { .. } => Refusal::ImpossibleLength,
-        UpdateError::NotBegun => Refusal::NotBegun,
-        UpdateError::WrongOffset { expected, .. } => Refusal::WrongOffset { expected },
-        UpdateError::TooMuch { .. } | UpdateError::Incomplete { .. } => Refusal::OtherLength,
-        UpdateError::Defect(Defect::OtherContainer { .. } | Defect::Refused(_)) => {
-            Refusal::BadGenome
-        }
-        UpdateError::Flash(_)
-        | UpdateError::NotWritten
-        | UpdateError::CountExhausted
-        | UpdateError::Defect(Defect::Unreadable) => Refusal::Flash,
-    }
-}
-
 impl Handler for LinkRobot {
     fn identify(&mut self) -> Identity<'_> {
-        let genome = match self.slots.newest() {
-            None => GenomeInUse::BuiltIn,
-            Some((slot, header)) => GenomeInUse::Slot {
-                slot: slot.index(),
-                write_count: header.write_count,
-                length: header.length,
-                crc: header.crc,
-            },
-        };
         Identity {
             firmware: "robot",
             version: "0.1.0",
             kernel: self.kernel,
-            genome,
+            genome: genome_in_use(&self.slots),
             running: self.report.running,
             faults: self.faults(),
         }
@@ -129,17 +104,24 @@ impl Handler for LinkRobot {
 
     fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal> {
         self.standing()?;
-        self.slots.begin(length, crc).map_err(refusal)
+        self.slots
+            .begin(length, crc)
+            .map_err(|error| refusal(&error))
     }
 
     fn chunk(&mut self, offset: u16, data: &[u8]) -> Result<(), Refusal> {
         self.standing()?;
-        self.slots.chunk(offset, data).map_err(refusal)
+        self.slots
+            .chunk(offset, data)
+            .map_err(|error| refusal(&error))
     }
 
     fn commit(&mut self) -> Result<u32, Refusal> {
         self.standing()?;
-        let count = self.slots.commit(&mut self.room).map_err(refusal)?;
+        let count = self
+            .slots
+            .commit(&mut self.room)
+            .map_err(|error| refusal(&error))?;
         self.controller = self.slots.in_use(&mut self.room).controller();
         self.state = State::new(&self.controller);
         Ok(count)

@@ -3,7 +3,7 @@
 use super::evaluate::flag;
 use super::{BadInput, read_genome};
 use crate::finished_run::FinishedRun;
-use crate::report::embedding::{c_header, intel_hex, probe_rs_line, rust_source};
+use crate::report::embedding::{c_header, intel_hex, probe_rs_line, rust_source, slot};
 use clap::{Args, ValueEnum};
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::exchange::Trajectory;
@@ -23,7 +23,8 @@ pub struct ExportArgs {
     /// The file to write; must not exist [default: standard output].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// For bin and hex: where in the chip's memory the genome will be.
+    /// For bin, slot and hex: where in the chip's memory that will be. The default is slot 1 of an
+    /// STM32F405 or STM32F407 with 1 MiB; slot 0 is at 0x080c0000.
     #[arg(
         long,
         value_name = "N",
@@ -31,7 +32,16 @@ pub struct ExportArgs {
         allow_hyphen_values = true
     )]
     address: String,
-    /// For bin: the chip, as probe-rs names it.
+    /// For slot: place of the genome among all written to this robot, from 1 on. The robot runs
+    /// the one with the larger; `flash` says which that is.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "1",
+        allow_hyphen_values = true
+    )]
+    write_count: String,
+    /// For bin and slot: the chip, as probe-rs names it.
     #[arg(long, value_name = "CHIP", default_value = "STM32F407VGTx")]
     chip: String,
 }
@@ -39,8 +49,12 @@ pub struct ExportArgs {
 /// Formats of other programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
-    /// The genome as it is; says how to write it to a chip with probe-rs.
+    /// The genome as it is, for a firmware that reads it there; says how to write it to a chip
+    /// with probe-rs.
     Bin,
+    /// A genome slot, for a firmware that has slots, with the genome in it; says how to write it
+    /// to a chip with probe-rs.
+    Slot,
     /// The genome as a C header.
     C,
     /// The genome as Rust source.
@@ -57,15 +71,15 @@ pub enum Format {
 /// [`BadInput`] if genome or run cannot be read or the file exists.
 pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
     let address = flag("address", &arguments.address, memory_address)?;
+    let write_count = flag("write-count", &arguments.write_count, count_from_1)?;
     let bytes = match arguments.format {
         Format::Trajectory => trajectory(arguments)?,
-        format => genome(arguments, format, address)?,
+        format => genome(arguments, format, address, write_count)?,
     };
     match &arguments.out {
-        None if arguments.format == Format::Bin && std::io::stdout().is_terminal() => {
-            return Err(
-                BadInput::new("--out is missing; a terminal cannot show --format = bin").into(),
-            );
+        None if is_for_a_chip(arguments.format) && std::io::stdout().is_terminal() => {
+            let missing = "--out is missing; a terminal cannot show --format = bin or slot";
+            return Err(BadInput::new(missing).into());
         }
         None => crate::output::write_bytes(&bytes),
         Some(path) => {
@@ -77,11 +91,20 @@ pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
             file.write_all(&bytes)?;
         }
     }
-    if arguments.format == Format::Bin {
-        let file = arguments.out.as_ref().unwrap_or(&arguments.from);
+    let file = match arguments.format {
+        // The genome file is the raw form itself.
+        Format::Bin => Some(arguments.out.as_ref().unwrap_or(&arguments.from)),
+        Format::Slot => arguments.out.as_ref(),
+        _ => None,
+    };
+    if let Some(file) = file {
         eprintln!("{}", probe_rs_line(file, &arguments.chip, address));
     }
     Ok(())
+}
+
+fn is_for_a_chip(format: Format) -> bool {
+    matches!(format, Format::Bin | Format::Slot)
 }
 
 fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
@@ -93,7 +116,12 @@ fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
     Ok(text)
 }
 
-fn genome(arguments: &ExportArgs, format: Format, address: u32) -> anyhow::Result<Vec<u8>> {
+fn genome(
+    arguments: &ExportArgs,
+    format: Format,
+    address: u32,
+    write_count: u32,
+) -> anyhow::Result<Vec<u8>> {
     let container = read_genome(&arguments.from)?;
     let encoded = EncodedGenome::decode(&container)?;
     Ok(match format {
@@ -109,8 +137,17 @@ fn genome(arguments: &ExportArgs, format: Format, address: u32) -> anyhow::Resul
             })?;
             text.into_bytes()
         }
+        Format::Slot => slot(&container, write_count),
         Format::Bin | Format::Trajectory => container,
     })
+}
+
+/// From 1 on: no slot is written as the zeroth.
+fn count_from_1(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(count @ 1..) => Ok(count),
+        _ => Err("expected a number from 1 to 4294967295".to_owned()),
+    }
 }
 
 /// An address, decimal or hexadecimal.

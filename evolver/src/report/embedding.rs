@@ -1,8 +1,10 @@
 //! Genomes for those who link them into a firmware or write them to a chip.
 
+use crate::robot::length_and_crc;
 use crate::settings::describe;
 use ihex::{Record, create_object_file_representation};
 use minimal_surprise_controller::EncodedGenome;
+use minimal_surprise_slots::Header;
 use std::path::Path;
 
 /// Bytes a line, in source text and Intel HEX.
@@ -76,7 +78,23 @@ pub fn intel_hex(container: &[u8], address: u32) -> Option<String> {
     create_object_file_representation(&records).ok()
 }
 
-/// The command that writes the raw container to a chip through a debug probe.
+/// A committed genome slot up to the end of the container: what a robot finds that keeps its genomes
+/// in slots. Of its two slots it uses the one with the larger `write_count`, which is 1 or more.
+///
+/// # Panics
+/// If it is no container: those are longer than four bytes, and shorter than 64 KiB.
+#[must_use]
+pub fn slot(container: &[u8], write_count: u32) -> Vec<u8> {
+    let (length, crc) = length_and_crc(container).expect("a container has a CRC");
+    let header = Header {
+        write_count,
+        length,
+        crc,
+    };
+    [&header.front(), container].concat()
+}
+
+/// The command that writes a file as it is to a chip through a debug probe.
 #[must_use]
 pub fn probe_rs_line(file: &Path, chip: &str, address: u32) -> String {
     format!(

@@ -117,6 +117,8 @@ fn main() -> ! {
     println!("step_instructions {=u32}", step_most);
     println!("step_stack_bytes {=u32}", step_depth);
     println!("decode_stack_bytes {=u32}", decode_depth);
+    println!("build_stack_bytes {=u32}", build_depth);
+    println!("start_stack_bytes {=u32}", open_depth);
     println!(
         "ram_bytes {=usize}",
         size_of::<Controller>() + size_of::<State>()
@@ -125,13 +127,6 @@ fn main() -> ! {
         "reset_to_first_step_instructions {=u32}",
         counter.instructions(reset_ticks) + start_most + step_most
     );
-    // Not held to anything, but good to know.
-    println!(
-        "# stack of decoding and building a controller: {=u32}",
-        build_depth
-    );
-    println!("# stack of the start from the slots: {=u32}", open_depth);
-
     let known = stack::depth(&mut || known_depth());
     assert!((KNOWN_BYTES..KNOWN_BYTES + 100).contains(&(known as usize)));
     board::succeed()

@@ -245,22 +245,43 @@ impl<B: Board, F: NorFlash> Body<B, F> {
 
     /// What the host is told about an update that failed.
     fn refusal(&mut self, error: UpdateError<F::Error>) -> Refusal {
-        match error {
-            UpdateError::ImpossibleLength { .. } => Refusal::ImpossibleLength,
-            UpdateError::NotBegun => Refusal::NotBegun,
-            UpdateError::WrongOffset { expected, .. } => Refusal::WrongOffset { expected },
-            UpdateError::TooMuch { .. } | UpdateError::Incomplete { .. } => Refusal::OtherLength,
-            UpdateError::Defect(Defect::OtherContainer { .. } | Defect::Refused(_)) => {
-                Refusal::BadGenome
-            }
-            UpdateError::Flash(_)
-            | UpdateError::NotWritten
-            | UpdateError::CountExhausted
-            | UpdateError::Defect(Defect::Unreadable) => {
-                self.lasting = self.lasting.and(Faults::FLASH);
-                Refusal::Flash
-            }
+        let refusal = refusal(&error);
+        if refusal == Refusal::Flash {
+            self.lasting = self.lasting.and(Faults::FLASH);
         }
+        refusal
+    }
+}
+
+/// What a host is told about an update that failed.
+#[must_use]
+pub fn refusal<E: core::fmt::Debug>(error: &UpdateError<E>) -> Refusal {
+    match *error {
+        UpdateError::ImpossibleLength { .. } => Refusal::ImpossibleLength,
+        UpdateError::NotBegun => Refusal::NotBegun,
+        UpdateError::WrongOffset { expected, .. } => Refusal::WrongOffset { expected },
+        UpdateError::TooMuch { .. } | UpdateError::Incomplete { .. } => Refusal::OtherLength,
+        UpdateError::Defect(Defect::OtherContainer { .. } | Defect::Refused(_)) => {
+            Refusal::BadGenome
+        }
+        UpdateError::Flash(_)
+        | UpdateError::NotWritten
+        | UpdateError::CountExhausted
+        | UpdateError::Defect(Defect::Unreadable) => Refusal::Flash,
+    }
+}
+
+/// What a host is told about the genome that the robot runs.
+#[must_use]
+pub fn genome_in_use<F: NorFlash>(slots: &Slots<F>) -> GenomeInUse {
+    match slots.newest() {
+        None => GenomeInUse::BuiltIn,
+        Some((slot, header)) => GenomeInUse::Slot {
+            slot: slot.index(),
+            write_count: header.write_count,
+            length: header.length,
+            crc: header.crc,
+        },
     }
 }
 
@@ -271,20 +292,11 @@ fn count(counter: &mut u32) {
 
 impl<B: Board, F: NorFlash> Handler for Body<B, F> {
     fn identify(&mut self) -> Identity<'_> {
-        let genome = match self.slots.newest() {
-            None => GenomeInUse::BuiltIn,
-            Some((slot, header)) => GenomeInUse::Slot {
-                slot: slot.index(),
-                write_count: header.write_count,
-                length: header.length,
-                crc: header.crc,
-            },
-        };
         Identity {
             firmware: "robot",
             version: env!("CARGO_PKG_VERSION"),
             kernel: KERNEL_ID,
-            genome,
+            genome: genome_in_use(&self.slots),
             running: self.report.running,
             faults: self.faults(),
         }

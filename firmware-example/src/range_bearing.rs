@@ -1,0 +1,61 @@
+//! Neighbours from a range-and-bearing module on a serial line.
+//!
+//! There is no standard for such modules, so this is one that a builder can make a module speak in
+//! a few lines. After each scan the module sends one frame, framed as on the robot's own line (`00`,
+//! COBS of message and CRC-32C, `00`; see `docs/link-protocol.md`). The message is
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 1 | neighbours found, 0 to 36 |
+//! | 2 each | range in mm between the centres of the two robots, unsigned, little-endian |
+//! | 2 each | bearing in 1/65536 turn, signed, little-endian; counter-clockwise from straight ahead |
+//!
+//! range and bearing of a neighbour side by side. A scan without neighbours is sent too: silence
+//! means that the module is broken, and the robot stands.
+
+use core::f32::consts::PI;
+use minimal_surprise_controller::neighbours::{Detection, Neighbours};
+use minimal_surprise_link::Decoder;
+
+/// The bearing of half a turn.
+const HALF_TURN: f32 = 32768.0;
+
+/// Finds scans in the bytes of a module.
+#[derive(Debug, Default)]
+pub struct RangeBearing {
+    decoder: Decoder,
+}
+
+impl RangeBearing {
+    /// One that has heard nothing.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            decoder: Decoder::new(),
+        }
+    }
+
+    /// Takes a byte. If it completes a scan, `neighbours` then holds this scan's and no others.
+    /// Says whether it does.
+    pub fn feed<const N: usize>(&mut self, byte: u8, neighbours: &mut Neighbours<N>) -> bool {
+        if !self.decoder.feed(byte) {
+            return false;
+        }
+        let Some((&count, rest)) = self.decoder.payload().split_first() else {
+            return false;
+        };
+        let (found, left) = rest.as_chunks();
+        if found.len() != usize::from(count) || !left.is_empty() {
+            return false;
+        }
+        neighbours.clear();
+        for &[r0, r1, b0, b1] in found {
+            let bearing = i16::from_le_bytes([b0, b1]);
+            neighbours.push(Detection {
+                range_mm: u16::from_le_bytes([r0, r1]).into(),
+                bearing_rad: f32::from(bearing) * (PI / HALF_TURN),
+            });
+        }
+        true
+    }
+}

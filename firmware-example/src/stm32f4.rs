@@ -1,0 +1,21 @@
+//! Where things are in the flash of an STM32F405 or STM32F407 with 1 MiB.
+//!
+//! Its last two sectors are the genome slots; the program, `stm32f4/memory.x`, has what is before.
+
+use minimal_surprise_slots::slot_bytes;
+
+/// First address of the flash.
+pub const FLASH_ADDRESS: u32 = 0x0800_0000;
+/// Bytes of the flash.
+pub const FLASH_BYTES: u32 = 1 << 20;
+/// Bytes of each sector from 0x08020000 on, which is what the chip erases at a time.
+pub const SECTOR_BYTES: u32 = 128 << 10;
+/// Address of slot 0.
+pub const SLOT_0_ADDRESS: u32 = 0x080c_0000;
+/// Address of slot 1.
+pub const SLOT_1_ADDRESS: u32 = SLOT_0_ADDRESS + slot_bytes(SECTOR_BYTES as usize) as u32;
+/// Bytes of both slots.
+pub const SLOTS_BYTES: u32 = 2 * slot_bytes(SECTOR_BYTES as usize) as u32;
+
+const _: () = assert!(SLOT_0_ADDRESS + SLOTS_BYTES == FLASH_ADDRESS + FLASH_BYTES);
+const _: () = assert!((SLOT_0_ADDRESS - FLASH_ADDRESS).is_multiple_of(SECTOR_BYTES));

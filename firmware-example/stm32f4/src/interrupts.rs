@@ -1,0 +1,167 @@
+//! What happens beside the loop: bytes arrive, control periods begin, and whoever cannot go on
+//! stops the wheels.
+//!
+//! The one module of this package with `unsafe` code: the runtime asks for an `unsafe fn` as
+//! handler of hard faults, and unmasking interrupts is unsafe. Neither touches memory.
+#![allow(unsafe_code)]
+
+use core::cell::RefCell;
+use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicBool, Ordering};
+use cortex_m::asm;
+use cortex_m::peripheral::NVIC;
+use cortex_m_rt::{ExceptionFrame, exception};
+use critical_section::Mutex;
+use firmware_example::robot::Motion;
+use heapless::Deque;
+use stm32f4xx_hal::nb;
+use stm32f4xx_hal::pac::{Interrupt, USART2, USART3, interrupt};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::serial::{Instance, Rx};
+
+use crate::wheels::Wheels;
+
+/// Bytes kept until the loop takes them: more than a frame on either line. Those that find no
+/// room are lost, as on the line.
+const BYTES_MAX: usize = 256;
+
+/// What loop and interrupts both use; none before it is there.
+type Shared<T> = Mutex<RefCell<Option<T>>>;
+
+/// A serial line's receiver and what it has received.
+struct Receiver<U: Instance> {
+    rx: Rx<U>,
+    bytes: Deque<u8, BYTES_MAX>,
+}
+
+static LINE: Shared<Receiver<USART2>> = Mutex::new(RefCell::new(None));
+static MODULE: Shared<Receiver<USART3>> = Mutex::new(RefCell::new(None));
+static WHEELS: Shared<Wheels> = Mutex::new(RefCell::new(None));
+static PERIOD_BEGUN: AtomicBool = AtomicBool::new(false);
+
+/// Works with what is shared; no interrupt occurs meanwhile.
+fn with<T, R>(shared: &Shared<T>, work: impl FnOnce(&mut T) -> R) -> Option<R> {
+    critical_section::with(|section| {
+        let mut shared = shared.borrow(section).try_borrow_mut().ok()?;
+        shared.as_mut().map(work)
+    })
+}
+
+fn put<T>(shared: &Shared<T>, value: T) {
+    critical_section::with(|section| shared.borrow(section).replace(Some(value)));
+}
+
+/// Takes charge of the wheels, which stand then.
+pub(crate) fn take_wheels(wheels: Wheels) {
+    put(&WHEELS, wheels);
+    drive(Motion::Stop);
+}
+
+/// Sets the wheels.
+pub(crate) fn drive(motion: Motion) {
+    with(&WHEELS, |wheels| wheels.drive(motion));
+}
+
+/// Begins to receive from the host's line and the range-and-bearing module.
+pub(crate) fn listen(mut line: Rx<USART2>, mut module: Rx<USART3>) {
+    line.listen();
+    module.listen();
+    put(&LINE, Receiver::new(line));
+    put(&MODULE, Receiver::new(module));
+    // SAFETY: nothing relies on these interrupts being masked; they share by `with` only.
+    unsafe {
+        NVIC::unmask(Interrupt::USART2);
+        NVIC::unmask(Interrupt::USART3);
+    }
+}
+
+/// The next byte from the host, if one has arrived.
+pub(crate) fn byte_from_line() -> Option<u8> {
+    with(&LINE, |line| line.bytes.pop_front()).flatten()
+}
+
+/// The next byte from the range-and-bearing module, if one has arrived.
+pub(crate) fn byte_from_module() -> Option<u8> {
+    with(&MODULE, |module| module.bytes.pop_front()).flatten()
+}
+
+/// Whether a control period has begun since the last call.
+pub(crate) fn take_period() -> bool {
+    PERIOD_BEGUN.swap(false, Ordering::Relaxed)
+}
+
+/// Waits for an interrupt, unless something is already there.
+pub(crate) fn sleep() {
+    critical_section::with(|_| {
+        let nothing = |bytes: Option<bool>| bytes.unwrap_or(true);
+        let idle = nothing(with(&LINE, |line| line.bytes.is_empty()))
+            && nothing(with(&MODULE, |module| module.bytes.is_empty()))
+            && !PERIOD_BEGUN.load(Ordering::Relaxed);
+        if idle {
+            // An interrupt wakes the processor here, and is taken after the critical section: so
+            // none can slip in between the look and the sleep.
+            asm::wfi();
+        }
+    });
+}
+
+/// Stops the wheels and waits for the watchdog, which tells the host about itself.
+pub(crate) fn stand() -> ! {
+    loop {
+        drive(Motion::Stop);
+    }
+}
+
+impl<U: Instance> Receiver<U> {
+    fn new(rx: Rx<U>) -> Self {
+        let bytes = Deque::new();
+        Self { rx, bytes }
+    }
+
+    fn receive(&mut self) {
+        loop {
+            match self.rx.read() {
+                Ok(byte) => {
+                    // Without room the byte is lost, and the frame's CRC tells.
+                    let _ = self.bytes.push_back(byte);
+                }
+                Err(nb::Error::WouldBlock) => return,
+                // A broken byte is lost too; reading has cleared the error.
+                Err(nb::Error::Other(_)) => {}
+            }
+        }
+    }
+}
+
+#[interrupt]
+fn USART2() {
+    with(&LINE, Receiver::receive);
+}
+
+#[interrupt]
+fn USART3() {
+    with(&MODULE, Receiver::receive);
+}
+
+/// A control period begins. Wheels that nobody has told anything for a whole period stand: the
+/// watchdog would need seconds for that.
+#[exception]
+fn SysTick() {
+    if PERIOD_BEGUN.swap(true, Ordering::Relaxed) {
+        drive(Motion::Stop);
+    }
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    drive(Motion::Stop);
+    defmt::error!("{}", defmt::Display2Format(info));
+    stand()
+}
+
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    drive(Motion::Stop);
+    defmt::error!("hard fault at {=u32:#010x}", frame.pc());
+    stand()
+}
