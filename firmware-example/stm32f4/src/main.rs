@@ -1,7 +1,8 @@
 //! The robot, on an STM32F405 or STM32F407 with 1 MiB of flash.
 //!
 //! **Not run on hardware yet.** It builds, and its loop, its slots and its line are those that the
-//! tests run in an emulator; what this package adds has only been checked against the manuals.
+//! tests run in an emulator; what this package adds has only been built, and read beside the HAL's
+//! sources.
 //! `docs/robot.md` says how to wire it, and what to try first.
 //!
 //! ```text
