@@ -2,7 +2,10 @@
 
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
+use std::collections::BTreeMap;
+use std::fs;
 use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tests::full;
 use tests::program::{Evolver, Finished};
@@ -165,6 +168,54 @@ fn two_processes_share_the_work() {
     other.wait_for_lines(1000);
     other.kill();
     assert_eq!(hashes_after(&evolver), expected());
+}
+
+/// Every file of the runs but `meta.json`, which says when and by which command.
+fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
+    let files = evolver.files().into_iter();
+    files
+        .filter(|file| file.starts_with("suite/runs/") && !file.ends_with("/meta.json"))
+        .map(|file| (file.clone(), evolver.read(&file)))
+        .collect()
+}
+
+#[test]
+fn processes_that_know_no_locks_leave_what_one_leaves() {
+    let alone = with_the_suite();
+    assert_eq!(alone.run(&RUN).code, Some(0));
+    let expected = contents(&alone);
+    let (ended, mut removed) = (AtomicBool::new(false), 0);
+    for _ in 0..if full::all_cases() { 20 } else { 4 } {
+        let evolver = with_the_suite();
+        let runs = evolver.folder().join("suite/runs");
+        ended.store(false, Ordering::Relaxed);
+        std::thread::scope(|scope| {
+            // As on a file system without locks: nobody meets the lock of another.
+            let remover = scope.spawn(|| {
+                let mut removed = 0;
+                while !ended.load(Ordering::Relaxed) {
+                    for run in fs::read_dir(&runs).into_iter().flatten().flatten() {
+                        removed += u32::from(fs::remove_file(run.path().join(".lock")).is_ok());
+                    }
+                }
+                removed
+            });
+            let killed = evolver.start(&RUN);
+            let others = [(); 2].map(|()| scope.spawn(|| evolver.run(&RUN)));
+            std::thread::sleep(Duration::from_millis(30));
+            killed.kill();
+            let ends = others.map(|other| other.join().expect("it does not panic"));
+            ended.store(true, Ordering::Relaxed);
+            for run in ends {
+                assert_eq!(run.code, Some(0), "{run:?}");
+            }
+            removed += remover.join().expect("it does not panic");
+        });
+        assert_eq!(hashes_after(&evolver), alone.text("suite/hashes.txt"));
+        assert!(contents(&evolver) == expected, "{:?}", evolver.files());
+    }
+    println!("{removed} locks removed");
+    assert!(removed > 0);
 }
 
 #[test]
