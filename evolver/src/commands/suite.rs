@@ -6,6 +6,7 @@ use super::{BadInput, thread_pool};
 use crate::files;
 use crate::report::progress::ProgressMode;
 use crate::report::suite_progress::SuiteProgress;
+use crate::report::summary::shell_word;
 use crate::settings::count;
 use crate::suite::plan::{Plan, PlannedRun};
 use crate::suite::work::{Progress, Shard, Worked, progress, work_on};
@@ -129,10 +130,12 @@ pub struct TaskArgs {
     manner: Manner,
 }
 
-/// A suite, with its text.
+/// A suite as it was read.
 struct Read {
     suite: Suite,
     text: String,
+    /// The command that it was read by.
+    called: String,
 }
 
 /// `evolver paper …`
@@ -142,7 +145,15 @@ struct Read {
 pub fn paper(verb: &Verb) -> anyhow::Result<ExitCode> {
     let suite = Suite::paper().map_err(BadInput::new)?;
     let text = PAPER.to_owned();
-    act(&Read { suite, text }, verb)
+    let called = "evolver paper".to_owned();
+    act(
+        &Read {
+            suite,
+            text,
+            called,
+        },
+        verb,
+    )
 }
 
 /// `evolver suite FILE …`
@@ -173,10 +184,15 @@ pub fn run_task(arguments: &TaskArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn read(file: &Path) -> Result<Read, BadInput> {
-    let suite = Suite::read(file).map_err(BadInput::new)?;
     let text = fs::read_to_string(file)
         .map_err(|error| BadInput::new(format!("{}: {error}", file.display())))?;
-    Ok(Read { suite, text })
+    let suite = Suite::parse(file, &text).map_err(BadInput::new)?;
+    let called = format!("evolver suite {}", shell_word(file));
+    Ok(Read {
+        suite,
+        text,
+        called,
+    })
 }
 
 fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
@@ -191,7 +207,13 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
         Verb::Plan(_) => print_plan(&plan),
         Verb::Status(_) => print_status(&plan, &directory),
         Verb::Report(_) => {
-            let written = report::write(&plan, &read.suite, &directory, &directory.join("report"))?;
+            let written = report::write(
+                &plan,
+                &read.suite,
+                &directory,
+                &directory.join("report"),
+                &read.called,
+            )?;
             show_line!(
                 "{} of {} runs; {}",
                 written.finished,
