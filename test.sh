@@ -1,8 +1,9 @@
 #!/bin/sh
 # Passes every test: ./test.sh, or ./test.sh --all with those that take longer.
 #
-# Provides what it needs (a C linker, the thumbv7em targets, QEMU, rustfmt and clippy), saying what
-# it installs. Needs Rust and, where one of these is missing, Debian's apt-get as root or by sudo.
+# Provides what it needs (a C linker, the thumbv7em targets, QEMU, GNU parallel, rustfmt and clippy;
+# for --all also Slurm), saying what it installs. Needs Rust and, where one of these is missing,
+# Debian's apt-get as root or by sudo.
 set -eu
 cd "$(dirname "$0")"
 
@@ -47,6 +48,18 @@ say 'tools'
 command -v cc >/dev/null || scripts/apt-install.sh gcc libc6-dev
 command -v qemu-system-arm >/dev/null || scripts/apt-install.sh qemu-system-arm
 command -v parallel >/dev/null || scripts/apt-install.sh parallel
+without_slurm=
+if [ -n "${TEST_ALL:-}" ]; then
+    if [ "$(id -u)" = 0 ] && getent hosts "$(hostname -s)" >/dev/null && { { command -v slurmctld && command -v slurmd && command -v sbatch &&
+        command -v munged; } >/dev/null ||
+        scripts/apt-install.sh slurmctld slurmd slurm-client munge; }; then
+        slurmctld -V
+    else
+        echo 'test.sh: no Slurm, which takes root and a host name in /etc/hosts, so no suite is run on one' >&2
+        [ "$strict" != true ] || exit 69
+        without_slurm='--skip real_slurm'
+    fi
+fi
 qemu-system-arm --version | head -n 1
 export PROVIDE_TOOLS=1
 targets='thumbv7em-none-eabihf thumbv7em-none-eabi'
@@ -114,7 +127,8 @@ say 'packages'
 cargo package --locked --workspace --exclude tests --allow-dirty --no-verify
 
 say 'tests'
-cargo test --locked --workspace --all-features -- --show-output
+# shellcheck disable=SC2086 # an option and its value
+cargo test --locked --workspace --all-features -- --show-output $without_slurm
 if [ -n "${TEST_ALL:-}" ]; then
     say 'every power cut after every power cut'
     cargo test --locked --release --package tests --test power_cuts -- --show-output

@@ -2,7 +2,10 @@
 
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
+use std::collections::BTreeMap;
+use std::fs;
 use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tests::full;
 use tests::program::{Evolver, Finished};
@@ -37,6 +40,15 @@ fn with_the_suite() -> Evolver {
     let evolver = Evolver::in_empty_folder();
     evolver.write("own.toml", SUITE.as_bytes());
     evolver
+}
+
+/// The hash of all runs, as `status` says it.
+fn hash_by_status(evolver: &Evolver) -> String {
+    let status = evolver.run(&["suite", "own.toml", "status", "--out", "suite"]);
+    let lines = status.stdout.lines();
+    let hash = lines.filter_map(|line| line.strip_prefix("hash ")).next();
+    hash.unwrap_or_else(|| panic!("no hash in {status:?}"))
+        .to_owned()
 }
 
 /// The hashes of an uninterrupted suite.
@@ -98,10 +110,13 @@ fn kills_at_random_moments_change_no_hash() {
 #[test]
 fn threads_shards_and_gnu_parallel_change_no_hash() {
     let expected = expected();
+    let mut hash = String::new();
     for threads in ["1", "2"] {
         let evolver = with_the_suite();
         let run = evolver.run(&[&RUN[..], &["--threads", threads]].concat());
         assert_eq!(run.code, Some(0), "{run:?}");
+        hash = hash_by_status(&evolver);
+        assert!(run.stdout.contains(&hash), "{hash}: {run:?}");
         assert_eq!(
             evolver.text("suite/hashes.txt"),
             expected,
@@ -116,6 +131,7 @@ fn threads_shards_and_gnu_parallel_change_no_hash() {
         let run = evolver.run(&task);
         assert!(run.stdout.contains("2 of 2 runs done"), "{run:?}");
     }
+    assert_eq!(hash_by_status(&evolver), hash);
     let mut lines: Vec<String> = (0..3)
         .flat_map(|shard| {
             let hashes = evolver.text(&format!("suite/hashes-{shard}-of-3.txt"));
@@ -153,7 +169,119 @@ fn gnu_parallel_runs_the_shards() {
         .output()
         .expect("it has just answered");
     assert!(output.status.success(), "{output:?}");
+    let by_status = hash_by_status(&evolver);
     assert_eq!(hashes_after(&evolver), expected());
+    assert_eq!(hash_by_status(&evolver), by_status);
+}
+
+#[test]
+fn a_task_ends_well_only_when_its_share_is_done() {
+    let expected = expected();
+    for patience in [0, 20, 500] {
+        let evolver = with_the_suite();
+        let other = evolver.start(&RUN);
+        let begun = || evolver.files().iter().any(|file| file.contains("/runs/"));
+        while !begun() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let task = [
+            "run-task", "--suite", "own.toml", "--out", "suite", "--shard", "0/1",
+        ];
+        let run = std::thread::scope(|scope| {
+            let task = scope.spawn(|| evolver.run(&task));
+            std::thread::sleep(Duration::from_millis(patience));
+            other.kill();
+            task.join().expect("it does not panic")
+        });
+        assert_eq!(run.code, Some(0), "{run:?}");
+        assert!(run.stdout.contains("6 of 6 runs done"), "{run:?}");
+        assert_eq!(evolver.text("suite/hashes.txt"), expected);
+    }
+}
+
+/// A folder with programs of Slurm's names, which keep what they are told and say what Slurm would.
+fn fake_slurm(evolver: &Evolver, sbatch: &str) -> String {
+    let programs = [
+        ("sbatch", sbatch),
+        ("scontrol", "echo 'MaxArraySize            = 4'"),
+    ];
+    fs::create_dir(evolver.folder().join("bin")).expect("the folder is new");
+    for (name, text) in programs {
+        evolver.write(
+            &format!("bin/{name}"),
+            format!("#!/bin/sh\n{text}\n").as_bytes(),
+        );
+        let path = evolver.folder().join("bin").join(name);
+        let made = Command::new("chmod").arg("+x").arg(path).status();
+        assert!(made.is_ok_and(|status| status.success()), "{name}");
+    }
+    let path = std::env::var("PATH").unwrap_or_default();
+    format!("{}/bin:{path}", evolver.folder().display())
+}
+
+const SUBMIT: [&str; 9] = [
+    "suite", "own.toml", "submit", "--engine", "slurm", "--shards", "5", "--out", "suite",
+];
+
+#[test]
+fn a_queued_task_does_not_meet_what_was_edited_or_submitted_later() {
+    let evolver = with_the_suite();
+    let path = fake_slurm(
+        &evolver,
+        "cp \"$1\" ../../../got.sh; echo Submitted batch job 7",
+    );
+    let path = ("PATH", path.as_str());
+    let shown = evolver.run_with(path, &[&SUBMIT[..], &["--dry-run"]].concat());
+    assert_eq!(shown.code, Some(0), "{shown:?}");
+    assert!(!evolver.folder().join("suite").exists(), "only shown");
+    let submitted = evolver.run_with(path, &SUBMIT);
+    assert_eq!(submitted.stdout, "Submitted batch job 7\n", "{submitted:?}");
+    assert_eq!(evolver.text("got.sh"), shown.stdout);
+
+    evolver.write("own.toml", SUITE.replace("runs = 3", "runs = 1").as_bytes());
+    let later = evolver.run_with(path, &SUBMIT);
+    assert_eq!(later.code, Some(0), "{later:?}");
+    let array = evolver.text("got.sh");
+    assert!(array.contains("--array=0-1\n"), "a task a run: {array}");
+    for index in 0..5 {
+        let task = Command::new("sh")
+            .arg("suite/jobs/1/job.sh")
+            .env("SLURM_ARRAY_TASK_ID", index.to_string())
+            .current_dir(evolver.folder())
+            .output()
+            .expect("the shell starts");
+        assert!(task.status.success(), "{task:?}");
+    }
+    evolver.write("own.toml", SUITE.as_bytes());
+    let by_status = hash_by_status(&evolver);
+    assert_eq!(hashes_after(&evolver), expected());
+    assert_eq!(hash_by_status(&evolver), by_status);
+}
+
+#[test]
+fn a_refused_submission_says_what_the_cluster_takes_and_leaves_nothing() {
+    let evolver = with_the_suite();
+    let path = fake_slurm(
+        &evolver,
+        "echo 'Invalid job array specification' >&2; exit 1",
+    );
+    let refused = evolver.run_with(("PATH", &path), &SUBMIT);
+    assert_eq!(refused.code, Some(1), "{refused:?}");
+    for words in [
+        "Invalid job array specification",
+        "--shards = 5",
+        "from 1 to 4",
+    ] {
+        assert!(refused.stderr.contains(words), "no {words:?}: {refused:?}");
+    }
+    let none = evolver.run_with(("PATH", "/none"), &SUBMIT);
+    assert!(none.stderr.contains("login node"), "{none:?}");
+    let percent = [&SUBMIT[..8], &["100%"]].concat();
+    let percent = evolver.run_with(("PATH", &path), &percent);
+    assert_eq!(percent.code, Some(2), "{percent:?}");
+    assert!(percent.stderr.contains("--out"), "{percent:?}");
+    let jobs = |file: &String| file.contains("jobs");
+    assert!(!evolver.files().iter().any(jobs), "{:?}", evolver.files());
 }
 
 #[test]
@@ -165,6 +293,56 @@ fn two_processes_share_the_work() {
     other.wait_for_lines(1000);
     other.kill();
     assert_eq!(hashes_after(&evolver), expected());
+}
+
+/// Every file of the runs but `meta.json`, which says by which command, and what a process left that
+/// was killed before a run had its name.
+fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
+    let files = evolver.files().into_iter();
+    files
+        .filter(|file| file.starts_with("suite/runs/") && !file.ends_with("/meta.json"))
+        .filter(|file| !file.starts_with("suite/runs/."))
+        .map(|file| (file.clone(), evolver.read(&file)))
+        .collect()
+}
+
+#[test]
+fn processes_that_know_no_locks_leave_what_one_leaves() {
+    let alone = with_the_suite();
+    assert_eq!(alone.run(&RUN).code, Some(0));
+    let expected = contents(&alone);
+    let (ended, mut removed) = (AtomicBool::new(false), 0);
+    for _ in 0..if full::all_cases() { 20 } else { 4 } {
+        let evolver = with_the_suite();
+        let runs = evolver.folder().join("suite/runs");
+        ended.store(false, Ordering::Relaxed);
+        std::thread::scope(|scope| {
+            // As on a file system without locks: nobody meets the lock of another.
+            let remover = scope.spawn(|| {
+                let mut removed = 0;
+                while !ended.load(Ordering::Relaxed) {
+                    for run in fs::read_dir(&runs).into_iter().flatten().flatten() {
+                        removed += u32::from(fs::remove_file(run.path().join(".lock")).is_ok());
+                    }
+                }
+                removed
+            });
+            let killed = evolver.start(&RUN);
+            let others = [(); 2].map(|()| scope.spawn(|| evolver.run(&RUN)));
+            std::thread::sleep(Duration::from_millis(30));
+            killed.kill();
+            let ends = others.map(|other| other.join().expect("it does not panic"));
+            ended.store(true, Ordering::Relaxed);
+            for run in ends {
+                assert_eq!(run.code, Some(0), "{run:?}");
+            }
+            removed += remover.join().expect("it does not panic");
+        });
+        assert_eq!(hashes_after(&evolver), alone.text("suite/hashes.txt"));
+        assert!(contents(&evolver) == expected, "{:?}", evolver.files());
+    }
+    println!("{removed} locks removed");
+    assert!(removed > 0);
 }
 
 #[test]
@@ -234,7 +412,7 @@ fn bad_suites_are_refused_with_their_place() {
     assert_refused(&evolver.run(&shard), &["--shard", "3/3", "i/n"]);
     assert_refused(
         &evolver.run(&["run-task", "--shard", "0/3"]),
-        &["--suite", "--out"],
+        &["--suite <FILE>"],
     );
     assert_eq!(evolver.files(), ["own.toml"], "nothing was written");
 }

@@ -22,15 +22,26 @@ impl FileError {
     }
 }
 
+/// What [`beside`] ends its names with.
+pub const PART: &str = ".part";
+
+/// A name beside a path, for what is to be renamed to it. It is drawn: process ids are the same on
+/// two machines that share a file system.
+#[must_use]
+pub fn beside(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let number: u64 = rand::random();
+    path.with_file_name(format!(".{name}.{number:016x}{PART}"))
+}
+
 /// Replaces a file as a whole: after a kill at any moment there is the old one or the new one.
 ///
 /// # Errors
 /// [`FileError`] if it cannot be written; the old file is then still there.
 pub fn replace(path: &Path, contents: &[u8]) -> Result<(), FileError> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let beside = path.with_file_name(format!(".{name}.part"));
+    let beside = beside(path);
     let write = || {
-        let mut file = File::create(&beside)?;
+        let mut file = File::create_new(&beside)?;
         file.write_all(contents)?;
         file.sync_data()?;
         fs::rename(&beside, path)

@@ -21,6 +21,7 @@ use crate::settings::{Given, SettingError, Settings};
 use crate::time_spent::{TimeSpent, Timer};
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
 use std::fs::{self, File, TryLockError};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// A run directory, held by this process alone.
@@ -29,6 +30,8 @@ pub struct RunDir {
     path: PathBuf,
     settings_text: String,
     timer: Timer,
+    /// Whether the table is kept until the run is complete.
+    table_last: bool,
     /// Holds the lock for as long as it lives.
     _lock: Option<File>,
 }
@@ -113,7 +116,7 @@ impl RunDir {
         if path.exists() {
             return Err(RunDirError::Exists(path.to_owned()));
         }
-        let part = part_beside(path);
+        let part = files::beside(path);
         remove_abandoned_parts(path);
         fs::create_dir(&part).map_err(FileError::at(&part))?;
         let settings_text = toml::to_string(&experiment.settings().written)
@@ -123,6 +126,7 @@ impl RunDir {
             path: part.clone(),
             settings_text,
             timer: Timer::after(TimeSpent::default()),
+            table_last: false,
         };
         run.save(experiment)?;
         let meta = tables::meta(experiment.settings());
@@ -174,13 +178,14 @@ impl RunDir {
         if !config.is_file() {
             return Err(missing(CONFIG));
         }
-        if path.join(DONE).is_file() {
-            let hash = String::from_utf8_lossy(&files::read(&path.join(DONE))?)
-                .trim()
-                .to_owned();
+        if let Some(hash) = finished(path)? {
             return Ok(Found::Finished(hash));
         }
         let lock = lock(path)?;
+        // Once more: who had the lock until now may have completed it.
+        if let Some(hash) = finished(path)? {
+            return Ok(Found::Finished(hash));
+        }
         let checkpoint = path.join(CHECKPOINT);
         if !checkpoint.is_file() {
             return Err(missing(CHECKPOINT));
@@ -205,9 +210,20 @@ impl RunDir {
             path: path.to_owned(),
             settings_text,
             timer: Timer::after(spent),
+            table_last: false,
             _lock: lock,
         };
         Ok(Found::Unfinished(Box::new(experiment), run))
+    }
+
+    /// For a run that others may be doing at the same time, unseen where the file system knows no
+    /// locks: the table appears when the run is complete. A slower process would otherwise put its
+    /// shorter table in the place of the complete one. Everything else that is written before the
+    /// end is a checkpoint, and any of them will do.
+    #[must_use]
+    pub fn with_table_last(mut self) -> Self {
+        self.table_last = true;
+        self
     }
 
     /// Saves an evolution between two generations.
@@ -234,8 +250,11 @@ impl RunDir {
     /// [`FileError`] if a file cannot be written; the last checkpoint is then still there.
     pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), FileError> {
         files::replace(&self.file(CHECKPOINT), &checkpoint.state)?;
-        files::replace(&self.file(GENERATIONS), checkpoint.generations.as_bytes())?;
-        files::replace(&self.file(TIME), checkpoint.time.as_bytes())
+        files::replace(&self.file(TIME), checkpoint.time.as_bytes())?;
+        if self.table_last {
+            return Ok(());
+        }
+        files::replace(&self.file(GENERATIONS), checkpoint.generations.as_bytes())
     }
 
     /// Saves the result and marks the run complete.
@@ -255,11 +274,7 @@ impl RunDir {
         let time = self.timer.spent().json();
         files::replace(&self.file(TIME), time.as_bytes())?;
         files::replace(&self.file(DONE), format!("{}\n", finding.hash).as_bytes())?;
-        for name in [CHECKPOINT, LOCK] {
-            let path = self.file(name);
-            fs::remove_file(&path).map_err(FileError::at(&path))?;
-        }
-        Ok(())
+        tidy(&self.path)
     }
 
     /// The directory.
@@ -273,10 +288,35 @@ impl RunDir {
     }
 }
 
-/// Where a directory is made before it gets its name: beside it, under this process's number.
-fn part_beside(path: &Path) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!(".{name}.{}.part", std::process::id()))
+/// The hash of a complete run; what is not needed any more is removed.
+fn finished(directory: &Path) -> Result<Option<String>, FileError> {
+    let done = directory.join(DONE);
+    if !done.is_file() {
+        return Ok(None);
+    }
+    let hash = files::read(&done)?;
+    // It is only in the way of the eye, and the directory need not be ours.
+    let _ = tidy(directory);
+    Ok(Some(String::from_utf8_lossy(&hash).trim().to_owned()))
+}
+
+/// Removes what a complete run does not need: checkpoint, lock, and files whose writing was cut
+/// short. Another process may be removing them, too.
+fn tidy(directory: &Path) -> Result<(), FileError> {
+    let entries = fs::read_dir(directory).map_err(FileError::at(directory))?;
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name == CHECKPOINT || name == LOCK || name.ends_with(files::PART) {
+            match fs::remove_file(entry.path()) {
+                Err(error) if error.kind() != ErrorKind::NotFound => {
+                    return Err(FileError::at(&entry.path())(error));
+                }
+                _ => {}
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Removes what processes left behind that ended while they made this directory. What another one
@@ -291,8 +331,12 @@ fn remove_abandoned_parts(path: &Path) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        let is_part = name.starts_with(&start) && name.ends_with(".part");
-        if is_part && matches!(lock(&entry.path()), Ok(Some(_))) {
+        if !name.starts_with(&start) || !name.ends_with(files::PART) {
+            continue;
+        }
+        // The lock is not made here: who has just made the directory is about to.
+        let lock = File::options().write(true).open(entry.path().join(LOCK));
+        if lock.is_ok_and(|lock| lock.try_lock().is_ok()) {
             // It is only in the way of the eye.
             let _ = fs::remove_dir_all(entry.path());
         }

@@ -7,19 +7,26 @@ use crate::files;
 use crate::finished_run::ReadRunError;
 use crate::report::progress::ProgressMode;
 use crate::report::suite_progress::{SearchProgress, SuiteProgress};
+use crate::report::summary::shell_word;
+use crate::run_dir::{Found, RunDir, RunDirError};
 use crate::settings::count;
 use crate::suite::plan::{Plan, PlannedRun};
 use crate::suite::search::{Search, look};
 use crate::suite::work::{Progress, Shard, Worked, progress, work_on};
 use crate::suite::{PAPER, Resilience, Suite, report, slurm};
 use clap::{Args, Subcommand, ValueEnum};
+use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 /// Exit code after Ctrl-C.
 const EXIT_INTERRUPTED: u8 = 130;
+
+/// How long a task waits until it looks again at runs that others hold.
+const LOOK_AGAIN: Duration = Duration::from_secs(1);
 
 /// A suite of one's own.
 #[derive(Debug, Args)]
@@ -44,7 +51,7 @@ pub enum Verb {
         #[command(flatten)]
         manner: Manner,
     },
-    /// Say how many runs are done.
+    /// Say how many runs are done; once all are, one hash for all.
     Status(Choice),
     /// Write the report: tables, figures and findings, from the runs that are done.
     Report(Choice),
@@ -56,7 +63,7 @@ pub enum Verb {
         /// The engine.
         #[arg(long, value_enum)]
         engine: ClusterEngine,
-        /// Tasks that the runs are dealt to.
+        /// Tasks that the runs are dealt to; no more than there are runs.
         #[arg(
             long,
             value_name = "N",
@@ -122,19 +129,21 @@ pub struct TaskArgs {
     /// Which share of the runs: i/n, i from 0.
     #[arg(long, value_name = "i/n")]
     shard: String,
-    /// The suite's TOML file [default: suite.toml in the directory of the suite].
+    /// The suite's TOML file.
     #[arg(long, value_name = "FILE")]
-    suite: Option<PathBuf>,
+    suite: PathBuf,
     #[command(flatten)]
     choice: Choice,
     #[command(flatten)]
     manner: Manner,
 }
 
-/// A suite, with its text.
+/// A suite as it was read.
 struct Read {
     suite: Suite,
     text: String,
+    /// The command that it was read by.
+    called: String,
 }
 
 /// `evolver paper …`
@@ -144,7 +153,15 @@ struct Read {
 pub fn paper(verb: &Verb) -> anyhow::Result<ExitCode> {
     let suite = Suite::paper().map_err(BadInput::new)?;
     let text = PAPER.to_owned();
-    act(&Read { suite, text }, verb)
+    let called = "evolver paper".to_owned();
+    act(
+        &Read {
+            suite,
+            text,
+            called,
+        },
+        verb,
+    )
 }
 
 /// `evolver suite FILE …`
@@ -161,24 +178,29 @@ pub fn suite(arguments: &SuiteArgs) -> anyhow::Result<ExitCode> {
 /// As [`paper`].
 pub fn run_task(arguments: &TaskArgs) -> anyhow::Result<ExitCode> {
     let shard = flag("shard", &arguments.shard, Shard::parse)?;
-    let file = match (&arguments.suite, &arguments.choice.out) {
-        (Some(file), _) => file.clone(),
-        (None, Some(directory)) => directory.join(slurm::SUITE_FILE),
-        (None, None) => {
-            return Err(BadInput::new("--suite or --out is missing: which suite is it?").into());
-        }
-    };
-    let read = read(&file)?;
+    let read = read(&arguments.suite)?;
     let plan = plan(&read.suite, &arguments.choice)?;
     let directory = directory(&read.suite, &arguments.choice);
-    run(&plan, shard, &[], &directory, &arguments.manner)
+    run(
+        &plan,
+        shard,
+        &[],
+        &directory,
+        &arguments.manner,
+        Others::WaitFor,
+    )
 }
 
 fn read(file: &Path) -> Result<Read, BadInput> {
-    let suite = Suite::read(file).map_err(BadInput::new)?;
     let text = fs::read_to_string(file)
         .map_err(|error| BadInput::new(format!("{}: {error}", file.display())))?;
-    Ok(Read { suite, text })
+    let suite = Suite::parse(file, &text).map_err(BadInput::new)?;
+    let called = format!("evolver suite {}", shell_word(file));
+    Ok(Read {
+        suite,
+        text,
+        called,
+    })
 }
 
 fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
@@ -192,11 +214,17 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
     match verb {
         Verb::Plan(_) => print_plan(&plan),
         Verb::Status(_) => {
-            print_status(&plan, &directory);
+            print_status(&plan, &directory)?;
             print_searches(&plan, &read.suite, &directory).map_err(BadInput::new)?;
         }
         Verb::Report(_) => {
-            let written = report::write(&plan, &read.suite, &directory, &directory.join("report"))?;
+            let written = report::write(
+                &plan,
+                &read.suite,
+                &directory,
+                &directory.join("report"),
+                &read.called,
+            )?;
             show_line!(
                 "{} of {} runs; {}",
                 written.finished,
@@ -210,7 +238,14 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
                 None => read.suite.resiliences.as_slice(),
                 Some(_) => &[],
             };
-            return run(&plan, Shard::ALL, searching, &directory, manner);
+            return run(
+                &plan,
+                Shard::ALL,
+                searching,
+                &directory,
+                manner,
+                Others::Leave,
+            );
         }
         Verb::Submit {
             engine: ClusterEngine::Slurm,
@@ -222,17 +257,23 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
             let job = slurm::Job {
                 name: &read.suite.name,
                 directory: &std::path::absolute(&directory)?,
-                shards: flag("shards", shards, |text| count(text, 100_000))?,
+                // A task without a run would only wait in the queue.
+                shards: flag("shards", shards, |text| count(text, 100_000))?
+                    .min(plan.runs().len().max(1) as u32),
                 at_once: match at_once {
                     Some(text) => Some(flag("at-once", text, |text| count(text, 100_000))?),
                     None => None,
                 },
                 flags: flags(choice),
             };
+            let unusable = |error| match error {
+                slurm::SubmitError::UnusablePath(_) => BadInput::new(error).into(),
+                other => anyhow::Error::from(other),
+            };
             if *dry_run {
-                show!("{}", job.script());
+                show!("{}", job.script().map_err(unusable)?);
             } else {
-                show_line!("{}", job.submit(&read.text)?);
+                show_line!("{}", job.submit(&read.text).map_err(unusable)?);
             }
         }
     }
@@ -297,7 +338,7 @@ fn print_plan(plan: &Plan) {
     );
 }
 
-fn print_status(plan: &Plan, directory: &Path) {
+fn print_status(plan: &Plan, directory: &Path) -> Result<(), RunDirError> {
     for experiment in &plan.experiments {
         show_line!("{}", experiment.name);
         for settings in &experiment.settings {
@@ -313,6 +354,13 @@ fn print_status(plan: &Plan, directory: &Path) {
             );
         }
     }
+    let runs = plan.runs();
+    let done = runs.len() - waiting(&runs, directory).len();
+    show_line!("\n{done} of {} different runs done", runs.len());
+    if done == runs.len() {
+        show_line!("hash {}", hash_of(&hashes(&runs, directory)?));
+    }
+    Ok(())
 }
 
 fn print_searches(plan: &Plan, suite: &Suite, directory: &Path) -> Result<(), ReadRunError> {
@@ -338,13 +386,23 @@ fn print_searches(plan: &Plan, suite: &Suite, directory: &Path) -> Result<(), Re
     Ok(())
 }
 
-/// Does the runs of a shard, then those beyond the plan that experiments search through.
+/// What to do about runs that other processes hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Others {
+    /// Leave them to those.
+    Leave,
+    /// Wait for those, or for their end: whoever started this takes its success for the share's.
+    WaitFor,
+}
+
+/// Does a share of the runs, then those beyond the plan that experiments search through.
 fn run(
     plan: &Plan,
     shard: Shard,
     searching: &[Resilience],
     directory: &Path,
     manner: &Manner,
+    others: Others,
 ) -> anyhow::Result<ExitCode> {
     let threads = match &manner.threads {
         Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
@@ -352,26 +410,42 @@ fn run(
     };
     let runs = shard.of_plan(plan);
     let stop = stop_on_ctrl_c()?;
-    let worked = thread_pool(threads)?.install(|| -> anyhow::Result<_> {
-        let Some(elsewhere) = work(plan, &runs, directory, manner.progress, &stop)? else {
-            return Ok(None);
-        };
-        for asked in searching {
-            if !search(plan, asked, directory, manner.progress, &stop)? {
-                return Ok(None);
-            }
+    let pool = thread_pool(threads)?;
+    let worked = loop {
+        let worked = pool.install(|| work(plan, &runs, directory, manner.progress, &stop))?;
+        match worked {
+            Some(1..) if stop.load(Ordering::Relaxed) => break None,
+            Some(1..) if others == Others::WaitFor => std::thread::sleep(LOOK_AGAIN),
+            _ => break worked,
         }
-        Ok(Some(elsewhere))
-    })?;
+    };
+    let mut searched = worked.is_some();
+    for asked in searching {
+        searched =
+            searched && pool.install(|| search(plan, asked, directory, manner.progress, &stop))?;
+    }
+    let worked = worked.filter(|_| searched);
     let Some(elsewhere) = worked else {
         eprintln!("interrupted; the same command goes on");
         return Ok(ExitCode::from(EXIT_INTERRUPTED));
     };
     let done = runs.len() - waiting(&runs, directory).len();
+    let mut hash = None;
+    if done == runs.len() {
+        let hashes = hashes(&runs, directory)?;
+        files::replace(&directory.join(shard.hashes_file()), hashes.as_bytes())?;
+        // A share's would be one that no other number of shares gives.
+        hash = (shard == Shard::ALL).then(|| hash_of(&hashes));
+    }
     if manner.progress == ProgressMode::Json {
         show_line!(
             "{}",
-            serde_json::json!({"event": "done", "runs_done": done, "runs": runs.len()})
+            serde_json::json!({
+                "event": "done",
+                "runs_done": done,
+                "runs": runs.len(),
+                "hash": hash,
+            })
         );
     } else {
         let others = match elsewhere {
@@ -383,10 +457,9 @@ fn run(
             runs.len(),
             directory.display()
         );
-    }
-    if done == runs.len() {
-        let hashes = hashes(&runs, directory)?;
-        files::replace(&directory.join(shard.hashes_file()), hashes.as_bytes())?;
+        if let Some(hash) = hash {
+            show_line!("hash {hash}");
+        }
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -456,12 +529,20 @@ fn search(
     Ok(ended)
 }
 
-/// A line a run: its name and its hash.
-fn hashes(runs: &[&PlannedRun], directory: &Path) -> Result<String, files::FileError> {
+/// A line a run that is done: its name and its hash.
+fn hashes(runs: &[&PlannedRun], directory: &Path) -> Result<String, RunDirError> {
     let mut text = String::new();
     for run in runs {
-        let hash = files::read(&run.directory(directory).join("DONE"))?;
-        text += &format!("{} {}", run.id, String::from_utf8_lossy(&hash));
+        // Opened, not only read: what a process left that was killed at the very end goes.
+        if let Found::Finished(hash) = RunDir::open(&run.directory(directory))? {
+            text += &format!("{} {hash}\n", run.id);
+        }
     }
     Ok(text)
+}
+
+/// One hash for all runs: the SHA-256 of their hashes as they are in `hashes.txt`.
+fn hash_of(hashes: &str) -> String {
+    let hash = Sha256::digest(hashes.as_bytes());
+    hash.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -201,7 +201,11 @@ impl Suite {
         Self::parse(path, &text)
     }
 
-    fn parse(path: &Path, text: &str) -> Result<Self, SuiteError> {
+    /// Reads a suite's text; the path is for errors.
+    ///
+    /// # Errors
+    /// [`SuiteError`] names the file and the place in it.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, SuiteError> {
         let suite: Self = toml::from_str(text).map_err(|error| SuiteError::Toml {
             path: path.to_owned(),
             error: Box::new(error),

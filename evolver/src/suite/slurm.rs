@@ -1,21 +1,27 @@
 //! Slurm: one job array whose tasks are shares of a suite's runs.
 //!
-//! The program and the suite are copied into the suite's directory at submission, so that a task
-//! that waits in the queue does not meet edited ones. Tasks tell each other nothing; one that is
-//! requeued, or runs twice, finds what is done by its files.
+//! Every submission has a folder of its own in the suite's directory, with copies of the program
+//! and the suite: a task that waits in the queue meets neither edited ones nor those of a later
+//! submission. Tasks tell each other nothing; one that is requeued, or runs twice, finds what is
+//! done by its files.
 
 use crate::files::{self, FileError};
 use std::fs;
-use std::io;
-use std::path::Path;
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The suite's copy in its directory.
-pub const SUITE_FILE: &str = "suite.toml";
+/// Folder of the submissions, in the suite's directory; each has a number.
+const JOBS: &str = "jobs";
+/// The suite's copy.
+const SUITE_FILE: &str = "suite.toml";
 /// The program's copy.
 const PROGRAM: &str = "evolver";
 /// The job script.
 const SCRIPT: &str = "job.sh";
+/// What a task says, in the folder that the array is submitted from: Slurm would not take every
+/// path in a script.
+const LOG: &str = "log-%a.txt";
 
 /// A job array.
 #[derive(Clone, Debug)]
@@ -38,21 +44,59 @@ pub enum SubmitError {
     /// A file cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
+    /// Slurm takes these characters for its own in the path of a log.
+    #[error("{}: Slurm writes no logs below a directory with % or \\ in its path; name another with --out", .0.display())]
+    UnusablePath(PathBuf),
     /// There is no `sbatch`.
     #[error("sbatch cannot be started ({0}); is this a login node of a Slurm cluster?")]
     NoSbatch(io::Error),
     /// Slurm refused the job.
-    #[error("sbatch refused the job: {0}")]
-    Refused(String),
+    #[error("sbatch refused the job: {said}{}", at_most(*.shards, *.array_max))]
+    Refused {
+        /// What it said.
+        said: String,
+        /// Tasks asked for.
+        shards: u32,
+        /// Most tasks that this cluster takes, where that is known and less.
+        array_max: Option<u32>,
+    },
+}
+
+fn at_most(shards: u32, array_max: Option<u32>) -> String {
+    array_max.map_or(String::new(), |most| {
+        format!("\n--shards = {shards}: this cluster takes from 1 to {most} (its MaxArraySize)")
+    })
 }
 
 impl Job<'_> {
-    /// The job script.
-    #[must_use]
-    pub fn script(&self) -> String {
-        let directory = quoted(&self.directory.to_string_lossy());
+    /// The job script of the next submission.
+    ///
+    /// # Errors
+    /// [`SubmitError::UnusablePath`].
+    pub fn script(&self) -> Result<String, SubmitError> {
+        self.check_path()?;
+        let jobs = self.directory.join(JOBS);
+        let next = (1_u32..).map(|number| jobs.join(number.to_string()));
+        let free = next.into_iter().find(|folder| !folder.exists());
+        Ok(self.script_in(&free.expect("there are more numbers than folders")))
+    }
+
+    fn check_path(&self) -> Result<(), SubmitError> {
+        if self.directory.to_string_lossy().contains(['%', '\\']) {
+            return Err(SubmitError::UnusablePath(self.directory.to_owned()));
+        }
+        Ok(())
+    }
+
+    fn script_in(&self, folder: &Path) -> String {
+        let word = |path: &Path| quoted(&path.to_string_lossy());
+        let plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
         let at_once = self.at_once.map_or(String::new(), |n| format!("%{n}"));
-        let flags: Vec<String> = self.flags.iter().map(|flag| quoted(flag)).collect();
+        let flags: String = self
+            .flags
+            .iter()
+            .map(|flag| format!(" {}", quoted(flag)))
+            .collect();
         format!(
             "#!/bin/sh\n\
              #SBATCH --job-name={name}\n\
@@ -60,44 +104,78 @@ impl Job<'_> {
              #SBATCH --cpus-per-task=1\n\
              #SBATCH --requeue\n\
              #SBATCH --open-mode=append\n\
-             #SBATCH --output={output}/log-%a.txt\n\
-             exec {directory}/{PROGRAM} run-task --shard \"$SLURM_ARRAY_TASK_ID/{shards}\" \
-             --out {directory} --threads 1 --progress lines {flags}\n",
-            name = self.name.replace(char::is_whitespace, "-"),
+             #SBATCH --output={LOG}\n\
+             exec {program} run-task --shard \"$SLURM_ARRAY_TASK_ID/{shards}\" \
+             --suite {suite} --out {directory} --threads 1 --progress lines{flags}\n",
+            name = self.name.replace(|c| !plain(c), "-"),
             last = self.shards - 1,
-            output = self.directory.to_string_lossy().replace(' ', "\\ "),
+            program = word(&folder.join(PROGRAM)),
+            suite = word(&folder.join(SUITE_FILE)),
+            directory = word(self.directory),
             shards = self.shards,
-            flags = flags.join(" "),
         )
     }
 
     /// Writes what the tasks need and submits the array; what `sbatch` says comes back.
     ///
     /// # Errors
-    /// [`SubmitError`] if a file cannot be written or Slurm does not take the job.
+    /// [`SubmitError`] if a file cannot be written or Slurm does not take the job; nothing of it is
+    /// left then.
     pub fn submit(&self, suite_text: &str) -> Result<String, SubmitError> {
-        fs::create_dir_all(self.directory).map_err(FileError::at(self.directory))?;
-        files::replace(&self.directory.join(SUITE_FILE), suite_text.as_bytes())?;
-        let program = self.directory.join(PROGRAM);
-        // Beside and renamed: an earlier submission's tasks may be running the copy.
-        let beside = self.directory.join(format!(".{PROGRAM}.part"));
+        self.check_path()?;
+        let folder = self.new_folder()?;
+        let submitted = self.submit_from(&folder, suite_text);
+        if submitted.is_err() {
+            // No task will ever look into it; that it cannot be removed changes nothing.
+            let _ = fs::remove_dir_all(&folder);
+        }
+        submitted
+    }
+
+    /// A new folder with the next number.
+    fn new_folder(&self) -> Result<PathBuf, FileError> {
+        let jobs = self.directory.join(JOBS);
+        fs::create_dir_all(&jobs).map_err(FileError::at(&jobs))?;
+        let mut number = 1_u32;
+        loop {
+            let folder = jobs.join(number.to_string());
+            match fs::create_dir(&folder) {
+                Ok(()) => return Ok(folder),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
+                Err(error) => return Err(FileError::at(&folder)(error)),
+            }
+        }
+    }
+
+    fn submit_from(&self, folder: &Path, suite_text: &str) -> Result<String, SubmitError> {
+        files::replace(&folder.join(SUITE_FILE), suite_text.as_bytes())?;
+        let program = folder.join(PROGRAM);
         std::env::current_exe()
-            .and_then(|this| fs::copy(this, &beside))
-            .and_then(|_| fs::rename(&beside, &program))
+            .and_then(|this| fs::copy(this, &program))
             .map_err(FileError::at(&program))?;
-        let script = self.directory.join(SCRIPT);
-        files::replace(&script, self.script().as_bytes())?;
+        files::replace(&folder.join(SCRIPT), self.script_in(folder).as_bytes())?;
         let output = Command::new("sbatch")
-            .arg(&script)
+            .arg(SCRIPT)
+            .current_dir(folder)
             .output()
             .map_err(SubmitError::NoSbatch)?;
         if output.status.success() {
-            Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
-        } else {
-            let said = String::from_utf8_lossy(&output.stderr);
-            Err(SubmitError::Refused(said.trim().to_owned()))
+            return Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned());
         }
+        Err(SubmitError::Refused {
+            said: String::from_utf8_lossy(&output.stderr).trim().to_owned(),
+            shards: self.shards,
+            array_max: array_max().filter(|&most| self.shards > most),
+        })
     }
+}
+
+/// Most tasks of an array on this cluster: Slurm does not say so when it refuses more.
+fn array_max() -> Option<u32> {
+    let output = Command::new("scontrol").args(["show", "config"]).output();
+    let config = String::from_utf8_lossy(&output.ok()?.stdout).into_owned();
+    let line = config.lines().find(|line| line.starts_with("MaxArraySize"));
+    line?.split('=').nth(1)?.trim().parse().ok()
 }
 
 /// A word for the shell.
@@ -118,14 +196,14 @@ mod tests {
             at_once: Some(3),
             flags: vec!["--runs".to_owned(), "2".to_owned()],
         };
-        let script = job.script();
+        let script = job.script_in(Path::new("/data/it's here/jobs/1"));
         assert!(script.contains("#SBATCH --array=0-7%3\n"), "{script}");
         assert!(
             script.contains("#SBATCH --job-name=own-suite\n"),
             "{script}"
         );
         assert!(
-            script.contains("'/data/it'\\''s here'/evolver run-task"),
+            script.contains("exec '/data/it'\\''s here/jobs/1/evolver' run-task"),
             "{script}"
         );
         assert!(

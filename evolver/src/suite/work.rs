@@ -100,6 +100,19 @@ pub fn work_on(
     run: &PlannedRun,
     suite: &Path,
     stop: &AtomicBool,
+    each_generation: impl FnMut(u32),
+) -> Result<Worked, RunDirError> {
+    match begin_or_go_on(run, suite, stop, each_generation) {
+        // Another process did the same run, unseen for lack of locks, and tidied up after both.
+        Err(_) if progress(run, suite) == Progress::Done => Ok(Worked::Completed),
+        worked => worked,
+    }
+}
+
+fn begin_or_go_on(
+    run: &PlannedRun,
+    suite: &Path,
+    stop: &AtomicBool,
     mut each_generation: impl FnMut(u32),
 ) -> Result<Worked, RunDirError> {
     let directory = run.directory(suite);
@@ -132,20 +145,104 @@ pub fn work_on(
 
 /// The run as it stands, held by this process; none if it is complete.
 fn open(run: &PlannedRun, directory: &Path) -> Result<Option<(Experiment, RunDir)>, RunDirError> {
-    for _ in 0..2 {
-        match RunDir::open(directory) {
-            Ok(Found::Finished(_)) => return Ok(None),
-            Ok(Found::Unfinished(experiment, held)) => return Ok(Some((*experiment, held))),
-            Err(RunDirError::NotARun { .. }) => {}
-            Err(error) => return Err(error),
-        }
-        let experiment = Experiment::new(run.settings.clone());
-        match RunDir::create(directory, &experiment) {
-            Ok(held) => return Ok(Some((experiment, held))),
+    let experiment = Experiment::new(run.settings.clone());
+    match found(directory) {
+        Err(RunDirError::NotARun { .. }) => match RunDir::create(directory, &experiment) {
+            Ok(held) => Ok(Some((experiment, held.with_table_last()))),
             // Another process has just made it.
-            Err(RunDirError::Exists(_)) => {}
-            Err(error) => return Err(error),
-        }
+            Err(RunDirError::Exists(_)) => found(directory),
+            Err(error) => Err(error),
+        },
+        found => found,
     }
-    Err(RunDirError::InUse(directory.to_owned()))
+}
+
+fn found(directory: &Path) -> Result<Option<(Experiment, RunDir)>, RunDirError> {
+    Ok(match RunDir::open(directory)? {
+        Found::Finished(_) => None,
+        Found::Unfinished(experiment, held) => Some((*experiment, held.with_table_last())),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::suite::Suite;
+    use std::collections::BTreeMap;
+    use std::fs;
+
+    const SUITE: &str = "
+        name = \"own\"
+        [[experiment]]
+        name = \"one\"
+        runs = 1
+        grids = [\"8x8\"]
+        robots = [20]
+        population = 6
+        generations = 6
+        repetitions = 2
+        steps = 30
+    ";
+
+    fn planned(scratch: &Path) -> PlannedRun {
+        let file = scratch.join("own.toml");
+        fs::write(&file, SUITE).unwrap();
+        let plan = Plan::new(&Suite::read(&file).unwrap(), None, None, false).unwrap();
+        plan.runs()[0].clone()
+    }
+
+    fn contents(directory: &Path) -> BTreeMap<String, Vec<u8>> {
+        let entries = fs::read_dir(directory).unwrap().map(Result::unwrap);
+        entries
+            .map(|entry| {
+                let name = entry.file_name().to_string_lossy().into_owned();
+                (name, fs::read(entry.path()).unwrap())
+            })
+            .collect()
+    }
+
+    #[test]
+    fn of_duplicates_without_locks_the_slower_one_changes_nothing() {
+        let scratch = tempfile::tempdir().unwrap();
+        let (run, stop) = (planned(scratch.path()), AtomicBool::new(false));
+        let (expected, suite) = (
+            scratch.path().join("expected"),
+            scratch.path().join("suite"),
+        );
+        work_on(&run, &expected, &stop, |_| {}).unwrap();
+        let expected = contents(&run.directory(&expected));
+        let directory = run.directory(&suite);
+
+        let (mut slower, held) = open(&run, &directory).unwrap().unwrap();
+        // Whoever comes now makes a lock of its own, as on two machines that know none.
+        fs::remove_file(directory.join(".lock")).unwrap();
+        assert_eq!(
+            work_on(&run, &suite, &stop, |_| {}).unwrap(),
+            Worked::Completed
+        );
+        while !slower.is_finished() {
+            slower
+                .advance(Engine::Fast, CodePath::best(), &stop)
+                .unwrap();
+            held.save(&slower).unwrap();
+            let mut now = contents(&directory);
+            assert!(now.remove("checkpoint").is_some());
+            assert_eq!(now, expected, "complete for all who look");
+        }
+        let finding = slower.finding().unwrap().unwrap();
+        held.finish(&slower, &finding).unwrap();
+        assert_eq!(contents(&directory), expected);
+    }
+
+    #[test]
+    fn what_is_in_the_way_of_a_run_is_an_error_that_names_it() {
+        let scratch = tempfile::tempdir().unwrap();
+        let run = planned(scratch.path());
+        let directory = run.directory(scratch.path());
+        fs::create_dir_all(&directory).unwrap();
+        fs::write(directory.join("a file"), "of someone else").unwrap();
+        let error = work_on(&run, scratch.path(), &AtomicBool::new(false), |_| {}).unwrap_err();
+        assert!(error.to_string().contains(&run.id), "{error}");
+        assert!(error.to_string().contains("config.toml"), "{error}");
+    }
 }

@@ -175,7 +175,8 @@ struct RunRow<'a> {
 }
 
 /// Writes the report of a plan's finished runs, with the data of its tables and figures as CSV.
-/// `directory` is that of the suite, `out` that of the report, which is made. If `out` has a
+/// `directory` is that of the suite, `out` that of the report, which is made; `called` is how the
+/// program was called with this suite, for the commands in it. If `out` has a
 /// `looked-into.md`, its text comes after the differences: paragraphs, and list items with a dash.
 ///
 /// # Errors
@@ -185,9 +186,10 @@ pub fn write(
     suite: &Suite,
     directory: &Path,
     out: &Path,
+    called: &str,
 ) -> Result<Written, ReportError> {
     let gathered = Gathered::read(plan, suite, directory)?;
-    let mut report = Report::of(&gathered, &suite.name)?;
+    let mut report = Report::of(&gathered, &suite.name, called)?;
     let looked_into = out.join(LOOKED_INTO);
     if looked_into.is_file() {
         let text = files::read(&looked_into)?;
@@ -230,7 +232,7 @@ impl Report {
     ///
     /// # Errors
     /// [`ReportError`] if a figure cannot be drawn.
-    pub fn of(gathered: &Gathered, suite: &str) -> Result<Self, ReportError> {
+    pub fn of(gathered: &Gathered, suite: &str, called: &str) -> Result<Self, ReportError> {
         let paper = PaperValues::for_suite(suite);
         let tables = tables::all(gathered, &paper);
         let missing = gathered
@@ -264,7 +266,7 @@ impl Report {
             making: gathered
                 .groups
                 .iter()
-                .map(|group| making(group, suite))
+                .map(|group| making(group, called))
                 .collect(),
             tables,
         })
@@ -338,7 +340,7 @@ fn p_value(p: f64) -> String {
     }
 }
 
-fn making(group: &Group, suite: &str) -> Making {
+fn making(group: &Group, called: &str) -> Making {
     let mut seeds = group.runs.iter().map(|run| run.finished.settings.seed);
     let programs: BTreeSet<&str> = group.runs.iter().map(|run| run.program.as_str()).collect();
     let mut hash = Sha256::new();
@@ -353,11 +355,6 @@ fn making(group: &Group, suite: &str) -> Making {
         .collect();
     let times = group.runs.iter().map(|run| run.time);
     let time = times.fold(TimeSpent::default(), TimeSpent::and);
-    let called = if suite == "paper" {
-        "evolver paper".to_owned()
-    } else {
-        format!("evolver suite {suite}.toml")
-    };
     Making {
         experiment: group.experiment.clone(),
         setting: group.label.clone(),
@@ -479,11 +476,16 @@ mod tests {
         }
         assert!(!last.directory(&directory).exists());
 
-        let written = write(&plan, &suite, &directory, &out).unwrap();
+        let called = "evolver suite suites/own.toml";
+        let written = write(&plan, &suite, &directory, &out, called).unwrap();
         assert_eq!((written.finished, written.planned), (5, 6));
         assert!(written.files.iter().all(|file| file.is_file()));
         let markdown = std::fs::read_to_string(&written.markdown).unwrap();
         assert!(markdown.contains("2 of 3 runs"), "{markdown}");
+        assert!(
+            markdown.contains("evolver suite suites/own.toml run --only two"),
+            "{markdown}"
+        );
         assert!(
             !markdown.contains("differs"),
             "there is no paper to differ from"
@@ -523,7 +525,8 @@ mod tests {
             }
         }
 
-        let again = write(&plan, &suite, &directory, &scratch.path().join("again")).unwrap();
+        let again = scratch.path().join("again");
+        let again = write(&plan, &suite, &directory, &again, called).unwrap();
         for (first, second) in written.files.iter().zip(&again.files) {
             assert_eq!(
                 std::fs::read(first).unwrap(),

@@ -1,0 +1,148 @@
+#!/usr/bin/env bash
+# A Slurm cluster of three one-core nodes on this machine, for tests; as root, on loopback only,
+# without systemd and cgroups.
+#
+#   scripts/slurm-cluster.sh DIR PORT PORT PORT PORT
+#
+# DIR is made and holds everything; the ports, of the controller and the nodes, must be free. Says
+# "up" once the nodes are idle: then use it with SLURM_CONF=DIR/slurm.conf. Obeys lines on standard
+# input: "kill n2" ends a node and the jobs on it at once, "start n2" brings it back; each is
+# answered with "done". Where standard input ends, everything does, so nothing outlives a test that
+# was killed.
+set -eu
+
+[ $# = 5 ] || { echo "usage: $0 DIR PORT PORT PORT PORT" >&2 && exit 2; }
+# Slurm looks it up at every step, and waits long where nothing knows it.
+if ! getent hosts "$(hostname -s)" >/dev/null; then
+    echo "$0: unknown host $(hostname -s): expected a line for 127.0.0.1 in /etc/hosts" >&2
+    exit 1
+fi
+
+mkdir -p "$1"
+dir=$(realpath "$1") controller_port=$2
+shift 2
+nodes='n1 n2 n3'
+host=$(hostname -s)
+conf=$dir/slurm.conf
+# Not exported: what ends the cluster would look like a part of it.
+unset SLURM_CONF
+
+# The processes of this cluster and its jobs: a daemon hands SLURM_CONF down to all that it starts.
+all() { grep -lzxF "SLURM_CONF=$conf" /proc/[0-9]*/environ 2>/dev/null | cut -d/ -f3; }
+
+# Those of a node: its daemons stand in its spool folder, its jobs have its name.
+of_node() {
+    for pid in $(all); do
+        if [ "$(readlink "/proc/$pid/cwd")" = "$dir/spool-$1" ] ||
+            grep -qzxF "SLURMD_NODENAME=$1" "/proc/$pid/environ" 2>/dev/null; then
+            echo "$pid"
+        fi
+    done
+}
+
+# Ends them at once, and what they have started meanwhile.
+end() {
+    while pids=$("$@") && [ -n "$pids" ]; do
+        # shellcheck disable=SC2086 # one word a process
+        kill -9 $pids 2>/dev/null || true
+        sleep 0.05
+    done
+}
+
+trap 'trap - EXIT; end all' EXIT
+trap 'exit 1' INT TERM HUP
+
+run() {
+    log=$dir/log/$1
+    shift
+    SLURM_CONF=$conf "$@" >>"$log" 2>&1 </dev/null &
+    # Or the shell would report that it was killed.
+    disown
+}
+
+start_node() {
+    cd "$dir/spool-$1"
+    run "$1" slurmd -D -c -N "$1"
+    cd "$dir"
+}
+
+# Tries until it is so, for half a minute at most.
+until_true() {
+    give_up=$((SECONDS + 30))
+    while [ $SECONDS -lt $give_up ]; do
+        if "$@"; then return; fi
+        sleep 0.1
+    done
+    echo "$0: this does not come true: $*" >&2
+    for log in "$dir"/log/*; do tail -n 5 "$log" >&2; done
+    exit 1
+}
+
+all_idle() { [ "$(SLURM_CONF=$conf sinfo --noheader --Node --format=%T 2>/dev/null | grep -cx idle)" = 3 ]; }
+
+mkdir "$dir"/{log,state,munge}
+# munged wants its socket to be in reach of all and its key of none.
+chmod 755 "$dir"
+chmod 700 "$dir/munge"
+(umask 077 && head -c 1024 /dev/urandom >"$dir/munge/key")
+
+{
+    cat <<EOF
+ClusterName=test
+SlurmctldHost=$host(127.0.0.1)
+SlurmctldPort=$controller_port
+CommunicationParameters=NoInAddrAny,NoCtldInAddrAny
+SlurmUser=root
+SlurmdUser=root
+AuthType=auth/munge
+AuthInfo=socket=$dir/munge.socket
+CredType=cred/munge
+StateSaveLocation=$dir/state
+SlurmdSpoolDir=$dir/spool-%n
+SlurmctldPidFile=$dir/controller.pid
+SlurmdPidFile=$dir/%n.pid
+# Nothing that takes a cgroup, a database or MPI.
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+JobAcctGatherType=jobacct_gather/none
+AccountingStorageType=accounting_storage/none
+SwitchType=switch/none
+MpiDefault=none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+# A core each, whatever this machine has.
+SlurmdParameters=config_overrides
+# A dead node is noticed soon, and used again as soon as it is back.
+SlurmdTimeout=10
+ReturnToService=2
+SchedulerParameters=sched_interval=1,sched_min_interval=0,batch_sched_delay=0,bf_interval=1
+KillWait=5
+# Few, so that a test can ask for more.
+MaxArraySize=101
+PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE
+EOF
+    for node in $nodes; do
+        echo "NodeName=$node NodeHostname=$host NodeAddr=127.0.0.1 Port=$1 CPUs=1 RealMemory=256"
+        shift
+    done
+} >"$conf"
+
+run munge munged --foreground --force --socket="$dir/munge.socket" --key-file="$dir/munge/key" \
+    --pid-file="$dir/munge/pid" --seed-file="$dir/munge/seed" --log-file="$dir/munge/log"
+until_true test -S "$dir/munge.socket"
+run controller slurmctld -D -c
+for node in $nodes; do
+    mkdir "$dir/spool-$node"
+    start_node "$node"
+done
+until_true all_idle
+echo up
+
+while read -r verb node; do
+    case $verb in
+        kill) end of_node "$node" ;;
+        start) start_node "$node" ;;
+        *) echo "$0: what is $verb?" >&2 && exit 2 ;;
+    esac
+    echo 'done'
+done
