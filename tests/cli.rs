@@ -95,6 +95,7 @@ fn a_run_directory_holds_what_it_should() {
         "run/final.json",
         "run/generations.csv",
         "run/meta.json",
+        "run/time.json",
     ];
     assert_eq!(evolver.files(), names);
     assert_eq!(evolver.text("run/DONE").trim(), hash_of(&run));

@@ -243,11 +243,12 @@ fn hash(evolver: &Evolver) -> String {
         .to_owned()
 }
 
-/// Every file of the runs but `meta.json`, which says by which command.
+/// Every file of the runs but `meta.json`, which says by which command, and `time.json`.
 fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files
-        .filter(|file| file.starts_with("suite/runs/") && !file.ends_with("/meta.json"))
+        .filter(|file| file.starts_with("suite/runs/"))
+        .filter(|file| !file.ends_with("/meta.json") && !file.ends_with("/time.json"))
         .map(|file| (file.clone(), evolver.read(&file)))
         .collect()
 }

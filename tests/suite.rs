@@ -295,12 +295,13 @@ fn two_processes_share_the_work() {
     assert_eq!(hashes_after(&evolver), expected());
 }
 
-/// Every file of the runs but `meta.json`, which says by which command, and what a process left that
+/// Every file of the runs but `meta.json` and `time.json`, which say by which command and how long, and what a process left that
 /// was killed before a run had its name.
 fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files
-        .filter(|file| file.starts_with("suite/runs/") && !file.ends_with("/meta.json"))
+        .filter(|file| file.starts_with("suite/runs/"))
+        .filter(|file| !file.ends_with("/meta.json") && !file.ends_with("/time.json"))
         .filter(|file| !file.starts_with("suite/runs/."))
         .map(|file| (file.clone(), evolver.read(&file)))
         .collect()
@@ -424,4 +425,76 @@ fn a_directory_that_cannot_be_written_is_said_to_be() {
     let run = evolver.run(&RUN);
     assert_ne!(run.code, Some(0), "{run:?}");
     assert!(run.stderr.contains("suite"), "{run:?}");
+}
+
+/// A file system of its own, as large as it is made; gone with this.
+struct SmallDisk(std::path::PathBuf);
+
+impl SmallDisk {
+    /// Only a privileged process gets one.
+    fn mounted_at(path: std::path::PathBuf, size: &str) -> Option<Self> {
+        fs::create_dir_all(&path).unwrap();
+        let mounted = Command::new("mount")
+            .args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"])
+            .arg(&path)
+            .output();
+        mounted
+            .is_ok_and(|output| output.status.success())
+            .then(|| Self(path))
+    }
+
+    fn grow_to(&self, size: &str) {
+        let grown = Command::new("mount")
+            .args(["-o", &format!("remount,size={size}")])
+            .arg(&self.0)
+            .status();
+        assert!(grown.unwrap().success());
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(&self.0).status();
+    }
+}
+
+#[test]
+fn a_suite_on_a_full_disk_says_so_and_goes_on_when_there_is_room() {
+    let evolver = with_the_suite();
+    let Some(disk) = SmallDisk::mounted_at(evolver.folder().join("suite"), "112k") else {
+        println!("skipped: no file system can be mounted here");
+        return;
+    };
+    let full = evolver.run(&RUN);
+    assert_eq!(full.code, Some(1), "{full:?}");
+    assert!(full.stderr.contains("No space left"), "{full:?}");
+    assert!(full.stderr.contains("suite/runs/"), "{full:?}");
+    disk.grow_to("8m");
+    let again = evolver.run(&RUN);
+    assert_eq!(again.code, Some(0), "{again:?}");
+    assert_eq!(evolver.text("suite/hashes.txt"), expected());
+}
+
+#[test]
+fn a_report_goes_where_it_is_asked_for_and_replaces_nothing_but_a_report() {
+    let evolver = with_the_suite();
+    assert_eq!(evolver.run(&RUN).code, Some(0));
+    let report =
+        |to: &str| evolver.run(&["suite", "own.toml", "report", "--out", "suite", "--to", to]);
+    for _ in 0..2 {
+        let written = report("results");
+        assert_eq!(written.code, Some(0), "{written:?}");
+    }
+    assert!(evolver.text("results/report.html").contains("<h1>"));
+    fs::create_dir(evolver.folder().join("letters")).unwrap();
+    evolver.write("letters/mother.txt", b"dear");
+    let refused = report("letters");
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.stderr.contains("letters"), "{refused:?}");
+    assert_eq!(
+        fs::read_dir(evolver.folder().join("letters"))
+            .unwrap()
+            .count(),
+        1
+    );
 }

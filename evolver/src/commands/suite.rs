@@ -54,7 +54,14 @@ pub enum Verb {
     /// Say how many runs are done; once all are, one hash for all.
     Status(Choice),
     /// Write the report: tables, figures and findings, from the runs that are done.
-    Report(Choice),
+    Report {
+        /// Which runs.
+        #[command(flatten)]
+        choice: Choice,
+        /// Where it is written [default: report/ in the directory of the suite].
+        #[arg(long, value_name = "DIR")]
+        to: Option<PathBuf>,
+    },
     /// Hand the runs to a cluster.
     Submit {
         /// Which runs.
@@ -207,7 +214,7 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
     let (Verb::Plan(choice)
     | Verb::Run { choice, .. }
     | Verb::Status(choice)
-    | Verb::Report(choice)
+    | Verb::Report { choice, .. }
     | Verb::Submit { choice, .. }) = verb;
     let plan = plan(&read.suite, choice)?;
     let directory = directory(&read.suite, choice);
@@ -217,14 +224,17 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
             print_status(&plan, &directory)?;
             print_searches(&plan, &read.suite, &directory).map_err(BadInput::new)?;
         }
-        Verb::Report(_) => {
-            let written = report::write(
-                &plan,
-                &read.suite,
-                &directory,
-                &directory.join("report"),
-                &read.called,
-            )?;
+        Verb::Report { to, .. } => {
+            let out = to.clone().unwrap_or_else(|| directory.join("report"));
+            if !report::may_be_written(&out) {
+                return Err(BadInput::new(format!(
+                    "--to = {}: it holds something else than a report; name a new directory, or \
+                     one with a report to replace",
+                    out.display()
+                ))
+                .into());
+            }
+            let written = report::write(&plan, &read.suite, &directory, &out, &read.called)?;
             show_line!(
                 "{} of {} runs; {}",
                 written.finished,

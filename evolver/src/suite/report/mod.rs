@@ -174,6 +174,19 @@ struct RunRow<'a> {
     program: &'a str,
 }
 
+/// Whether a report would replace nothing but a report: the directory is new or empty, or has one,
+/// or what is to be said in it.
+#[must_use]
+pub fn may_be_written(out: &Path) -> bool {
+    match std::fs::read_dir(out) {
+        Err(_) => !out.exists(),
+        Ok(mut entries) => {
+            let known = ["report.html", LOOKED_INTO];
+            entries.next().is_none() || known.iter().any(|name| out.join(name).is_file())
+        }
+    }
+}
+
 /// Writes the report of a plan's finished runs, with the data of its tables and figures as CSV.
 /// `directory` is that of the suite, `out` that of the report, which is made; `called` is how the
 /// program was called with this suite, for the commands in it. If `out` has a
