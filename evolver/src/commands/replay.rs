@@ -8,12 +8,15 @@ use crate::files;
 use crate::finished_run::FinishedRun;
 use crate::replay::recording::{Origin, Recording};
 use crate::replay::scene::Colouring;
+use crate::replay::terminal::{self, PlayError};
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::damage::Damage;
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::{Area, SeedTree};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What to look at, and how.
 #[derive(Debug, Args)]
@@ -51,8 +54,33 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
         ))
         .into());
     }
-    let _ = (recording, arguments.colour);
-    Ok(())
+    let stop = stop_on_signal()?;
+    in_terminal(&recording, arguments.colour, &stop)
+}
+
+/// Plays a recording in the terminal until the user, or `stop`, ends it.
+///
+/// # Errors
+/// [`BadInput`] if there is no terminal.
+pub(super) fn in_terminal(
+    recording: &Recording,
+    colouring: Colouring,
+    stop: &AtomicBool,
+) -> anyhow::Result<()> {
+    terminal::play(recording, colouring, stop).map_err(|error| match error {
+        PlayError::NotATerminal => {
+            BadInput::new(format!("{error}; --html FILE writes a page instead")).into()
+        }
+        error => error.into(),
+    })
+}
+
+/// In the terminal Ctrl-C is a key; this is for those who are not at its keyboard.
+fn stop_on_signal() -> Result<Arc<AtomicBool>, ctrlc::Error> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
+    Ok(stop)
 }
 
 fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {
