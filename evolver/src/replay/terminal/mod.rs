@@ -10,16 +10,19 @@ pub mod screen;
 
 use super::recording::Recording;
 use super::scene::Colouring;
+use crossterm::event::{self, Event};
 use paints::Paints;
 use player::Player;
 use ratatui::DefaultTerminal;
-use ratatui::crossterm::event::{self, Event};
 use std::io::{self, IsTerminal};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Longest wait for a key before it is looked whether to end.
 const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Shortest wait: without any, no key would ever be seen where drawing is slow.
+const A_LOOK: Duration = Duration::from_millis(1);
 
 /// A replay cannot be played.
 #[derive(Debug, thiserror::Error)]
@@ -76,7 +79,7 @@ fn watch(
             terminal.draw(|frame| screen::draw(frame, player, paints))?;
         }
         let left = match player.pause() {
-            Some(pause) => pause.saturating_sub(last.elapsed()).min(PATIENCE),
+            Some(pause) => pause.saturating_sub(last.elapsed()).clamp(A_LOOK, PATIENCE),
             None => PATIENCE,
         };
         changed = event::poll(left)?;

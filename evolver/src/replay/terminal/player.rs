@@ -2,7 +2,7 @@
 
 use crate::replay::recording::Recording;
 use crate::replay::scene::{Colouring, Scene};
-use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use std::ops::Range;
 use std::time::Duration;
 
