@@ -18,8 +18,22 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+/// The keys of the terminal.
+const KEYS: &str = "\
+Keys in the terminal:
+  space               play, pause
+  ← →                 step back, forward; ↑ ↓ (PgUp PgDn) by ten
+  0–9 Home End        seek, by tenths of the run
+  + -                 speed
+  n p (Tab Shift-Tab) next, previous robot: what it senses and what it had predicted; Esc lets go
+  c                   colour: structure, surprise, plain
+  b                   the swarm before it was damaged, and back
+  h j k l             scroll, where the grid is larger than the window
+  q Ctrl-C            quit";
+
 /// What to look at, and how.
 #[derive(Debug, Args)]
+#[command(after_help = KEYS)]
 pub struct ReplayArgs {
     /// A run directory, a genome file, or an agent_trajectory.
     run: PathBuf,

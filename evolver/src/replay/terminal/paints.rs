@@ -109,3 +109,26 @@ impl Paints {
 pub fn soft() -> Style {
     Style::new().add_modifier(Modifier::DIM)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inks_and_marks_stay_apart_in_few_colours_and_have_none_where_none_are_wanted() {
+        for paints in [Paints::Sixteen, Paints::Indexed, Paints::True] {
+            let inks = [
+                paints.named(),
+                paints.other(),
+                paints.warning(),
+                paints.hit(),
+            ];
+            for (index, ink) in inks.iter().enumerate() {
+                assert!(ink.fg.is_some(), "{paints:?}");
+                assert!(!inks[..index].contains(ink), "{paints:?}: {ink:?}");
+            }
+        }
+        assert_eq!(Paints::None.named(), Style::new());
+        assert_eq!(Paints::None.mark(Mark::MissEmpty).fg, None);
+    }
+}

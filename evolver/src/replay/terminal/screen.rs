@@ -272,12 +272,13 @@ fn charts(recording: &Recording, t: usize, paints: Paints) -> Vec<Chart> {
 }
 
 impl Chart {
-    /// The mean of every column's states; what is yet to come is faint.
+    /// A column stands for the mean of its states, or several for one; what is yet to come is faint.
     fn bars(&self, columns: u16, player: &Player<'_>) -> Sparkline<'static> {
         let states = self.values.len();
-        let columns = usize::from(columns).min(states).max(1);
+        let columns = usize::from(columns);
         let bars = (0..columns).map(|column| {
-            let (from, to) = (column * states / columns, (column + 1) * states / columns);
+            let from = column * states / columns;
+            let to = ((column + 1) * states / columns).max(from + 1);
             let mean = self.values[from..to].iter().sum::<f64>() / (to - from) as f64;
             let style = if from <= player.t {
                 self.style
@@ -350,7 +351,13 @@ fn picked(player: &Player<'_>, scene: &Scene, paints: Paints) -> Vec<Line<'stati
         lines.push(key(&format!("foreseen {:>2}", count(hits)), hits));
         lines.push(key(&format!("mispredicted {:>2}", count(misses)), misses));
     }
-    lines.push(Line::styled("left of their cells    Esc lets go", soft()));
+    lines.push(Line::styled(
+        match player.recording.minds {
+            Some(_) => "left of their cells    Esc lets go",
+            None => "Esc lets it go",
+        },
+        soft(),
+    ));
     lines.push(Line::default());
     lines
 }
@@ -420,4 +427,153 @@ fn draw_keys(frame: &mut Frame<'_>, area: Rect) {
         [Span::from(" "), key.bold(), Span::styled(does, soft())]
     });
     frame.render_widget(Line::from_iter(spans), area);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::replay::recording::Origin;
+    use crossterm::event::{KeyCode, KeyEvent};
+    use minimal_surprise_controller::{Genome, Topology};
+    use minimal_surprise_sim::exchange::Trajectory;
+    use minimal_surprise_sim::{Grid, NoiseRate, Scenario, SeedTree};
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::SeedableRng;
+    use ratatui::Terminal;
+    use ratatui::backend::TestBackend;
+
+    /// A pair that faces east and west, a robot that drives north, and one that turns.
+    fn recording() -> Recording {
+        let states = [
+            "2, 3, 1, 0|3, 3, -1, 0|0, 0, 0, 1|5, 1, 0, -1",
+            "2, 3, 1, 0|3, 3, -1, 0|0, 1, 0, 1|5, 1, 1, 0",
+            "2, 3, 1, 0|3, 3, -1, 0|0, 2, 0, 1|5, 1, 0, -1",
+        ];
+        let mut text = "Gen: 0\nGrid: 7, 5\nAgents: 4\n".to_owned();
+        for (t, robots) in states.into_iter().enumerate() {
+            for robot in robots.split('|') {
+                text.push_str(&format!("{t}: {robot}\n"));
+            }
+        }
+        let trajectory = Trajectory::read(&text).unwrap();
+        Recording::of_trajectory("folder/agent_trajectory", &trajectory).unwrap()
+    }
+
+    fn screen(player: &mut Player<'_>, columns: u16, rows: u16) -> Vec<String> {
+        let mut terminal = Terminal::new(TestBackend::new(columns, rows)).unwrap();
+        let drawn = terminal.draw(|frame| draw(frame, player, Paints::None));
+        let cells = drawn.unwrap().buffer.content.chunks(columns.into());
+        let rows = cells.map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>());
+        rows.map(|row| row.trim_end().to_owned()).collect()
+    }
+
+    fn press(player: &mut Player<'_>, key: KeyCode) {
+        assert!(!player.key(KeyEvent::from(key)));
+    }
+
+    #[test]
+    fn a_wide_window_shows_swarm_and_what_is_known_of_it_side_by_side() {
+        let recording = recording();
+        let mut player = Player::new(&recording, Colouring::Structure);
+        press(&mut player, KeyCode::Right);
+        press(&mut player, KeyCode::Char('n'));
+        let expected = [
+            " agent_trajectory  7x5  4 robots  poses only",
+            " pair and random dispersion (tied)",
+            " · · · · · · ·   temperature  0.25",
+            " · · ▶ ◀ · · ·",
+            " · · · · · · ·                        ▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄",
+            " ▴ · · · · ▸ ·   in pair  2 of 4",
+            " · · · · · · ·",
+            "                 ███████████████████████████████████████████████████████████████",
+            "                 robot 0 at 2,3 facing east",
+            "                 nothing is known of its mind",
+            "                 Esc lets it go",
+            "",
+            "                 ▶ pair",
+            "                 ▸ another structure",
+            "                 ▷ none",
+            "",
+            " paused   10/s  step 1 of 2  ━━━━━━━━━━━━━━━━━━━━━━━━━──────────────────────────",
+            " space play  ← → step  ↑ ↓ ten  0–9 seek  + - speed  n p robot  c colour  q quit",
+        ];
+        assert_eq!(screen(&mut player, 80, 18), expected);
+    }
+
+    #[test]
+    fn a_low_and_narrow_window_shows_the_swarm_the_time_and_that_it_is_cropped() {
+        let recording = recording();
+        let mut player = Player::new(&recording, Colouring::Plain);
+        let expected = [
+            " · · · · · · ·",
+            " · · ▶ ◀ · · ·",
+            " · · · · · · ·",
+            " cropped: x 0–6 of 7, y 2–4 of 5   h j",
+            " paused   10/s  step 0 of 2  ─────────",
+        ];
+        assert_eq!(screen(&mut player, 38, 5), expected);
+    }
+
+    #[test]
+    fn no_window_is_too_small() {
+        let recording = recording();
+        for (columns, rows) in (1..50).flat_map(|columns| (1..26).map(move |rows| (columns, rows)))
+        {
+            let mut player = Player::new(&recording, Colouring::Structure);
+            press(&mut player, KeyCode::Char('p'));
+            let _ = screen(&mut player, columns, rows);
+        }
+    }
+
+    #[test]
+    fn a_view_scrolls_to_the_edges_and_no_farther() {
+        let recording = recording();
+        let mut player = Player::new(&recording, Colouring::Plain);
+        assert_eq!(player.view(3, 2), [0..3, 3..5]);
+        press(&mut player, KeyCode::Char('l'));
+        press(&mut player, KeyCode::Char('j'));
+        assert_eq!(player.view(3, 2), [4..7, 0..2]);
+        press(&mut player, KeyCode::Char('h'));
+        press(&mut player, KeyCode::Char('k'));
+        assert_eq!(player.view(3, 2), [0..3, 3..5]);
+        assert_eq!(player.view(100, 100), [0..7, 0..5]);
+    }
+
+    #[test]
+    fn a_picked_robot_is_in_view_until_the_view_is_scrolled() {
+        let recording = recording();
+        let mut player = Player::new(&recording, Colouring::Plain);
+        for robot in 0..recording.robots() {
+            press(&mut player, KeyCode::Char('n'));
+            assert_eq!(player.picked, Some(robot));
+            for (t, key) in [(0, KeyCode::Home), (1, KeyCode::Right), (2, KeyCode::End)] {
+                press(&mut player, key);
+                let pose = recording.poses(t)[robot];
+                let [x, y] = player.view(2, 1);
+                assert!(x.contains(&pose.x) && y.contains(&pose.y), "{robot}, {t}");
+            }
+        }
+        press(&mut player, KeyCode::Char('h'));
+        assert_eq!(player.view(2, 1)[0], 0..2);
+    }
+
+    #[test]
+    fn the_known_of_a_mind_is_drawn_with_every_ink_and_mark() {
+        let topology = Topology::default();
+        let genome = Genome::random(topology, &mut ChaCha8Rng::seed_from_u64(1));
+        let grid = Grid::new(9, 9).unwrap();
+        let scenario = Scenario::new(grid, 30, 20, NoiseRate::NONE).unwrap();
+        let trial = scenario.trial(SeedTree::new(1), 0, 0);
+        let recording = Recording::of_trial(&genome, &scenario, &trial, Origin::default()).unwrap();
+        let mut player = Player::new(&recording, Colouring::Surprise);
+        press(&mut player, KeyCode::Char('n'));
+        let mut seen = String::new();
+        for _ in 0..=recording.steps() {
+            seen.push_str(&screen(&mut player, 80, 24).join("\n"));
+            press(&mut player, KeyCode::Right);
+        }
+        for drawn in "▷▸▶!■□✘×●○".chars() {
+            assert!(seen.contains(drawn), "no {drawn}");
+        }
+    }
 }
