@@ -5,7 +5,7 @@ use crate::replay::palette::is_hollow;
 use crate::replay::scene::{Ink, Mark, Robot, Scene};
 use minimal_surprise_sim::Heading;
 use minimal_surprise_sim::drawing::{EMPTY, arrow, hollow_arrow};
-use ratatui::style::{Modifier, Style};
+use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use std::ops::Range;
 
@@ -67,8 +67,8 @@ pub fn lines(scene: &Scene, x: Range<u16>, y: Range<u16>, paints: Paints) -> Vec
         let cell = &mut cells[at(drawn.x, drawn.y)];
         let mut style = paints.ink(drawn.ink);
         if scene.picked == Some(index) {
-            style = style.add_modifier(Modifier::REVERSED | Modifier::BOLD);
-            style = style.remove_modifier(Modifier::DIM);
+            // In the terminal's own colours: a hue behind the arrow would hide it.
+            style = Style::new().bold().reversed();
             cell[0] = (' ', style);
         }
         if drawn.ink == Ink::Surprise(3) {

@@ -17,7 +17,7 @@ use ratatui::widgets::{LineGauge, Sparkline, SparklineBar};
 use std::path::Path;
 
 /// Fewest columns beside the swarm for what is known of it.
-const PANEL: u16 = 30;
+const PANEL: u16 = 34;
 
 /// Most columns for it.
 const WIDE_PANEL: u16 = 64;
@@ -382,6 +382,9 @@ fn legend(player: &Player<'_>, paints: Paints) -> Vec<Line<'static>> {
             lines.push(entry(Ink::Other, "another structure".to_owned()));
             lines.push(entry(Ink::Outside, "none".to_owned()));
             lines
+        }
+        Colouring::Surprise if player.t == recording.steps() => {
+            vec!["the run ends before they sense".into()]
         }
         Colouring::Surprise => {
             let most = Span::styled(
