@@ -295,8 +295,8 @@ fn two_processes_share_the_work() {
     assert_eq!(hashes_after(&evolver), expected());
 }
 
-/// Every file of the runs but `meta.json` and `time.json`, which say by which command and how long, and what a process left that
-/// was killed before a run had its name.
+/// Every file of the runs but `meta.json` and `time.json`, which say by which command and how long,
+/// and what a process left that was killed before a run had its name.
 fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files

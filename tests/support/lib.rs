@@ -11,4 +11,6 @@ pub mod program;
 pub mod pty;
 pub mod robot;
 pub mod structures;
+#[cfg(unix)]
+pub mod terminal;
 pub mod tools;

@@ -1,8 +1,13 @@
 //! `evolver evolve`: evolve a swarm, or go on with a run.
 
+use super::replay::in_terminal;
 use super::{BadInput, thread_pool};
 use crate::evolving::until_finished;
 use crate::experiment::Experiment;
+use crate::finished_run::FinishedRun;
+use crate::replay::recording::Recording;
+use crate::replay::scene::Colouring;
+use crate::replay::terminal;
 use crate::report::progress::{Progress, ProgressMode};
 use crate::report::summary;
 use crate::run_dir::{Found, RunDir};
@@ -79,6 +84,9 @@ pub struct EvolveArgs {
     /// What evaluates; the result does not depend on it.
     #[arg(long, value_enum, default_value_t)]
     engine: EngineName,
+    /// Watch the run in the terminal as soon as it has ended.
+    #[arg(long)]
+    open: bool,
 }
 
 impl EvolveArgs {
@@ -138,6 +146,9 @@ struct Manner {
 pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
     let given = arguments.given().map_err(BadInput::new)?;
     let threads = settings::threads(&given).map_err(BadInput::new)?;
+    if arguments.open {
+        terminal::check().map_err(|error| BadInput::new(format!("--open: {error}")))?;
+    }
     let manner = Manner {
         progress: arguments.progress,
         engine: match arguments.engine {
@@ -155,6 +166,10 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
                     show_line!("{done}");
                 } else {
                     show_line!("{} is complete; its hash is {hash}", directory.display());
+                }
+                if arguments.open {
+                    let stop = stop_on_ctrl_c()?;
+                    watch(directory, &stop)?;
                 }
                 return Ok(ExitCode::SUCCESS);
             }
@@ -178,16 +193,34 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
         }
     };
     let stop = stop_on_ctrl_c()?;
-    thread_pool(threads)?.install(|| generations(experiment, &run, manner, &stop))
+    let finished =
+        thread_pool(threads)?.install(|| generations(experiment, &run, manner, &stop))?;
+    if !finished {
+        return Ok(ExitCode::from(EXIT_INTERRUPTED));
+    }
+    if arguments.open {
+        watch(run.path(), &stop)?;
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
-/// Evaluates the generations that are left, saving each, and reports.
+/// Plays a run that has ended.
+fn watch(directory: &Path, stop: &AtomicBool) -> anyhow::Result<()> {
+    let recording = Recording::of_run(
+        &directory.display().to_string(),
+        &FinishedRun::read(directory)?,
+    )?;
+    in_terminal(&recording, Colouring::default(), stop)
+}
+
+/// Evaluates the generations that are left, saving each, and reports; says whether it came to the
+/// end.
 fn generations(
     mut experiment: Experiment,
     run: &RunDir,
     manner: Manner,
     stop: &AtomicBool,
-) -> anyhow::Result<ExitCode> {
+) -> anyhow::Result<bool> {
     let done = experiment.history().len() as u32;
     let progress = Progress::start(manner.progress, experiment.settings(), done);
     let how = (manner.engine, manner.path);
@@ -199,7 +232,7 @@ fn generations(
         let program = summary::program();
         let directory = summary::shell_word(run.path());
         eprintln!("interrupted; go on with: {program} evolve --resume {directory}");
-        return Ok(ExitCode::from(EXIT_INTERRUPTED));
+        return Ok(false);
     }
     progress.end();
     let finding = experiment
@@ -218,7 +251,7 @@ fn generations(
     } else {
         show!("\n{}", summary::evolved(&experiment, &finding, run.path()));
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(true)
 }
 
 /// The first Ctrl-C asks for an end after this generation, the second ends at once; both leave a

@@ -8,15 +8,32 @@ use crate::files;
 use crate::finished_run::FinishedRun;
 use crate::replay::recording::{Origin, Recording};
 use crate::replay::scene::Colouring;
+use crate::replay::terminal::{self, PlayError};
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::damage::Damage;
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::{Area, SeedTree};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The keys of the terminal.
+const KEYS: &str = "\
+Keys in the terminal:
+  space               play, pause
+  ← →                 step back, forward; ↑ ↓ (PgUp PgDn) by ten
+  0–9 Home End        seek, by tenths of the run
+  + -                 speed
+  n p (Tab Shift-Tab) next, previous robot: what it senses and what it had predicted; Esc lets go
+  c                   colour: structure, surprise, plain
+  b                   the swarm before it was damaged, and back
+  h j k l             scroll, where the grid is larger than the window
+  q Ctrl-C            quit";
 
 /// What to look at, and how.
 #[derive(Debug, Args)]
+#[command(after_help = KEYS)]
 pub struct ReplayArgs {
     /// A run directory, a genome file, or an agent_trajectory.
     run: PathBuf,
@@ -51,8 +68,33 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
         ))
         .into());
     }
-    let _ = (recording, arguments.colour);
-    Ok(())
+    let stop = stop_on_signal()?;
+    in_terminal(&recording, arguments.colour, &stop)
+}
+
+/// Plays a recording in the terminal until the user, or `stop`, ends it.
+///
+/// # Errors
+/// [`BadInput`] if there is no terminal.
+pub(super) fn in_terminal(
+    recording: &Recording,
+    colouring: Colouring,
+    stop: &AtomicBool,
+) -> anyhow::Result<()> {
+    terminal::play(recording, colouring, stop).map_err(|error| match error {
+        PlayError::NotATerminal => {
+            BadInput::new(format!("{error}; --html FILE writes a page instead")).into()
+        }
+        error => error.into(),
+    })
+}
+
+/// In the terminal Ctrl-C is a key; this is for those who are not at its keyboard.
+fn stop_on_signal() -> Result<Arc<AtomicBool>, ctrlc::Error> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
+    Ok(stop)
 }
 
 fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {

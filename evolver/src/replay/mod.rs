@@ -6,3 +6,4 @@
 pub mod palette;
 pub mod recording;
 pub mod scene;
+pub mod terminal;

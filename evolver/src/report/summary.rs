@@ -80,6 +80,7 @@ pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> 
          hash          {hash}\n\
          run           {directory}\n\n\
          next:\n  \
+         watch it               {program} replay {directory}\n  \
          measure the run        {program} classify {directory}\n  \
          from other starts      {program} evaluate {directory}\n  \
          look into the genome   {program} inspect {directory}/best.genome\n  \

@@ -1,0 +1,225 @@
+//! A program in a terminal: a pseudo-terminal that somebody types into, and whose screen is read.
+
+use crate::program::Evolver;
+use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
+use std::io::{Read, Write};
+use std::num::NonZeroU16;
+use std::process::Command;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// Longest wait for the screen to show something.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A program that runs in a terminal. It is killed when this is dropped.
+pub struct Terminal {
+    child: Box<dyn Child + Send + Sync>,
+    master: Box<dyn MasterPty + Send>,
+    keys: Box<dyn Write + Send>,
+    output: Receiver<Vec<u8>>,
+    parser: vt100::Parser,
+    line_settings: u32,
+}
+
+fn size(rows: u16, columns: u16) -> PtySize {
+    PtySize {
+        rows,
+        cols: columns,
+        pixel_width: 0,
+        pixel_height: 0,
+    }
+}
+
+fn some(count: u16) -> NonZeroU16 {
+    NonZeroU16::new(count).expect("a window has rows and columns")
+}
+
+fn line_settings(master: &(dyn MasterPty + Send)) -> u32 {
+    let settings = master.get_termios().expect("it is a terminal");
+    settings.local_flags.bits()
+}
+
+impl Terminal {
+    /// Starts the program in a terminal of so many rows and columns, which knows 256 colours.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    #[must_use]
+    pub fn start(
+        evolver: &Evolver,
+        (rows, columns): (u16, u16),
+        variables: &[(&str, &str)],
+        arguments: &[&str],
+    ) -> Self {
+        let pair = native_pty_system()
+            .openpty(size(rows, columns))
+            .expect("a pseudo-terminal");
+        let mut command = CommandBuilder::new(evolver.program());
+        command.args(arguments);
+        command.cwd(evolver.folder());
+        for unwanted in [
+            "CARGO",
+            "CI",
+            "NO_COLOR",
+            "COLORTERM",
+            "CLICOLOR",
+            "CLICOLOR_FORCE",
+            "FORCE_COLOR",
+            "TERM_PROGRAM",
+        ] {
+            command.env_remove(unwanted);
+        }
+        command.env("TERM", "xterm-256color");
+        for (name, value) in variables {
+            command.env(name, value);
+        }
+        let line_settings = line_settings(&*pair.master);
+        let child = pair.slave.spawn_command(command).expect("it starts");
+        let mut reader = pair.master.try_clone_reader().expect("its output");
+        let keys = pair.master.take_writer().expect("its input");
+        let (sender, output) = channel();
+        std::thread::spawn(move || {
+            let mut buffer = [0; 4096];
+            while let Ok(count @ 1..) = reader.read(&mut buffer) {
+                if sender.send(buffer[..count].to_vec()).is_err() {
+                    break;
+                }
+            }
+        });
+        Self {
+            child,
+            master: pair.master,
+            keys,
+            output,
+            parser: vt100::Parser::new(some(rows), some(columns), 0),
+            line_settings,
+        }
+    }
+
+    /// Types.
+    ///
+    /// # Panics
+    /// If nobody listens.
+    pub fn types(&mut self, keys: &str) {
+        self.keys.write_all(keys.as_bytes()).expect("it listens");
+        self.keys.flush().expect("it listens");
+    }
+
+    /// Makes the window another size.
+    ///
+    /// # Panics
+    /// If the terminal is gone.
+    pub fn resize(&mut self, rows: u16, columns: u16) {
+        self.parser.screen_mut().set_size(some(rows), some(columns));
+        self.master.resize(size(rows, columns)).expect("it is open");
+    }
+
+    /// The screen as it is.
+    #[must_use]
+    pub fn screen(&self) -> &vt100::Screen {
+        self.parser.screen()
+    }
+
+    /// Rows of the screen, without spaces at their ends.
+    #[must_use]
+    pub fn rows(&self) -> Vec<String> {
+        let (_, columns) = self.screen().size();
+        let rows = self.screen().rows(0, columns.into());
+        rows.map(|row| row.trim_end().to_owned()).collect()
+    }
+
+    /// Waits until the screen shows these words.
+    ///
+    /// # Panics
+    /// If it does not in time.
+    pub fn wait_for(&mut self, words: &str) {
+        self.wait_until(words, true);
+    }
+
+    /// Waits until the screen does not show these words any more.
+    ///
+    /// # Panics
+    /// If it does not in time.
+    pub fn wait_while(&mut self, words: &str) {
+        self.wait_until(words, false);
+    }
+
+    fn wait_until(&mut self, words: &str, shown: bool) {
+        let started = Instant::now();
+        while self.screen().contents().contains(words) != shown {
+            let left = PATIENCE.saturating_sub(started.elapsed());
+            match self.output.recv_timeout(left) {
+                Ok(bytes) => self.parser.process(&bytes),
+                Err(error) => panic!(
+                    "{words:?} shown: {}, {error}:\n{}",
+                    !shown,
+                    self.screen().contents()
+                ),
+            }
+        }
+    }
+
+    /// Types, and waits until the screen shows these words.
+    ///
+    /// # Panics
+    /// If it does not in time.
+    pub fn after(&mut self, keys: &str, words: &str) {
+        self.types(keys);
+        self.wait_for(words);
+    }
+
+    /// Sends the program a signal.
+    ///
+    /// # Panics
+    /// If it has ended.
+    pub fn signal(&self, signal: &str) {
+        let id = self.child.process_id().expect("it has not ended");
+        let sent = Command::new("sh")
+            .args(["-c", &format!("kill -{signal} {id}")])
+            .status();
+        assert!(sent.is_ok_and(|status| status.success()), "kill {id}");
+    }
+
+    /// Waits for the end of the program; gives its exit code.
+    ///
+    /// # Panics
+    /// If it does not end in time.
+    pub fn ended(&mut self) -> u32 {
+        let started = Instant::now();
+        let status = loop {
+            if let Some(status) = self.child.try_wait().expect("it is our child") {
+                break status;
+            }
+            assert!(started.elapsed() < PATIENCE, "it goes on");
+            match self.output.recv_timeout(Duration::from_millis(20)) {
+                Ok(bytes) => self.parser.process(&bytes),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    std::thread::sleep(Duration::from_millis(5));
+                }
+            }
+        };
+        // What it wrote last is still on its way.
+        while let Ok(bytes) = self.output.recv_timeout(Duration::from_millis(500)) {
+            self.parser.process(&bytes);
+        }
+        status.exit_code()
+    }
+
+    /// Whether the screen, the cursor and the line are as a shell needs them.
+    #[must_use]
+    pub fn is_restored(&self) -> bool {
+        let screen = self.screen();
+        !screen.alternate_screen()
+            && !screen.hide_cursor()
+            && line_settings(&*self.master) == self.line_settings
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        // It may have ended; the end of the process cleans up after it.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
