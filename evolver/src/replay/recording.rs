@@ -291,11 +291,13 @@ fn origin(name: &str, finished: &FinishedRun) -> Origin {
         seed: Some(finished.settings.seed),
         run_hash: Some(finished.hash.clone()),
         noise: finished.settings.written.noise,
+        evolution: finished.best_fitness.clone(),
         ..Origin::default()
     }
 }
 
-fn members(grid: Grid, poses: &[Pose]) -> Result<Vec<u8>, WorldError> {
+/// The structures that every robot belongs to: bit `i` for `Structure::ALL[i]`.
+pub(super) fn members(grid: Grid, poses: &[Pose]) -> Result<Vec<u8>, WorldError> {
     let found = classify(grid, poses)?;
     Ok((0..poses.len() as u32)
         .map(|robot| {
