@@ -3,6 +3,7 @@
 use super::conditions::GenomeConditions;
 use super::damage::corners;
 use super::evaluate::flag;
+use super::pictures::PictureArgs;
 use super::{BadInput, read_genome};
 use crate::files;
 use crate::finished_run::FinishedRun;
@@ -36,6 +37,8 @@ pub struct ReplayArgs {
     /// What the colours of robots say.
     #[arg(long, value_enum, default_value_t)]
     colour: Colouring,
+    #[command(flatten)]
+    pictures: PictureArgs,
 }
 
 /// Shows a run.
@@ -43,6 +46,7 @@ pub struct ReplayArgs {
 /// # Errors
 /// [`BadInput`] if there is nothing to look at, or a flag does not fit.
 pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
+    arguments.pictures.refuse_existing()?;
     let recording = recording(arguments)?;
     if recording.steps() == 0 {
         return Err(BadInput::new(format!(
@@ -51,7 +55,9 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
         ))
         .into());
     }
-    let _ = (recording, arguments.colour);
+    if arguments.pictures.is_any() {
+        return arguments.pictures.write(&recording, arguments.colour);
+    }
     Ok(())
 }
 
