@@ -387,7 +387,7 @@ fn what_a_run_does_not_have_is_refused() {
     let evolver = with_a_run();
     let exported = evolver.run(&words("export run --format trajectory --out trajectory"));
     assert_eq!(exported.code, Some(0), "{exported:?}");
-    let cases: [(&str, &[&str]); 17] = [
+    let cases: [(&str, &[&str]); 19] = [
         ("run --svg a --at 61", &["--at = 61", "0 to 60"]),
         ("run --svg a --at -1", &["--at = -1", "0 or more"]),
         ("run --svg a --at x", &["--at = x", "whole number"]),
@@ -401,6 +401,14 @@ fn what_a_run_does_not_have_is_refused() {
         (
             "run --svg a --width-mm 39",
             &["--width-mm = 39", "40 to 500"],
+        ),
+        (
+            "run --svg a --width-mm 50 --remove 0,0,3,3",
+            &["--width-mm = 50", "words of this picture need", "mm"],
+        ),
+        (
+            "run --svg a --width-mm 40 --what predictions",
+            &["--width-mm = 40", "words of this picture need"],
         ),
         ("run --png a --dpi 0", &["--dpi = 0", "50 to 1200"]),
         (

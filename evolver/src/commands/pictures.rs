@@ -229,6 +229,9 @@ impl PictureArgs {
         match &error {
             PictureError::NoState { .. } => given("at", &self.at),
             PictureError::NoRobot { .. } => given("robot", &self.robot),
+            PictureError::TooNarrow { .. } => {
+                BadInput::new(format!("--width-mm = {}: {error}", self.width_mm))
+            }
             PictureError::NoFfmpeg => {
                 let file = self.mp4.as_ref().map(|file| file.display().to_string());
                 given("mp4", &file)

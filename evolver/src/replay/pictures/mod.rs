@@ -76,6 +76,12 @@ pub enum PictureError {
     /// Nothing was damaged.
     #[error("nothing was damaged; say what with --remove or --reposition")]
     NoDamage,
+    /// Words would be cut off or cover others.
+    #[error("the words of this picture need {needed} mm")]
+    TooNarrow {
+        /// Least width, in millimetres.
+        needed: u32,
+    },
     /// More pixels than a picture can have.
     #[error("{width} x {height} pixels are too many; a picture has 64 million at most")]
     TooLarge {

@@ -2,7 +2,7 @@
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, channels};
 use super::symbols::{arrow, square};
-use super::{PictureError, named};
+use super::{PictureError, named, words};
 use crate::replay::palette::Theme;
 use crate::replay::recording::Recording;
 use crate::replay::scene::Ink;
@@ -35,13 +35,18 @@ pub(super) fn predictions(
     let (right, left) = sides(cells.iter().map(|cell| cell.left).collect());
     let columns = left - right + 1.0;
     let rows = ahead - behind + 1.0;
+    let title = format!("average predictions, {}", named(recording));
+    let needed = words::width(&title, words) + 2.0 * margin;
     let width = match size {
+        Size::Paper(width) if width < needed => {
+            let needed = needed.ceil() as u32;
+            return Err(PictureError::TooNarrow { needed });
+        }
         Size::Paper(width) => width,
-        Size::Screen(_) => columns * CELL_MAX * words + 2.0 * margin,
+        Size::Screen(_) => (columns * CELL_MAX * words + 2.0 * margin).max(needed),
     };
     let side = ((width - 2.0 * margin) / columns).min(CELL_MAX * words);
     let header = 2.0 * words;
-    let title = format!("average predictions, {}", named(recording));
     let mut drawing = Drawing::new(size, theme, &title);
     drawing.set_size(width, header + rows * side + margin);
     let above = (width / 2.0, header / 2.0);

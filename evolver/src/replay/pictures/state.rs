@@ -35,13 +35,10 @@ impl Caption {
         let robots = recording.robots();
         match recording.name() {
             None => Self::unchanging(named(recording)),
-            Some(_) => {
-                let name = named(recording);
-                Self {
-                    words: format!("{name}: {members} of {robots} robots"),
-                    longest: format!("{name}: {robots} of {robots} robots"),
-                }
-            }
+            Some(name) => Self {
+                words: format!("{name}: {members} of {robots} robots"),
+                longest: format!("{name}: {robots} of {robots} robots"),
+            },
         }
     }
 
@@ -55,14 +52,14 @@ impl Caption {
 pub(super) fn state(recording: &Recording, t: usize, look: &Look) -> Result<Drawing, PictureError> {
     let scene = scene(recording, t, look)?;
     let legend = Legend::of([&scene], look.colouring, recording);
-    Ok(of_state(recording, t, look, scene, &legend))
+    of_state(recording, t, look, scene, &legend)
 }
 
 /// State `t` as one of many, whose legend and size are the same.
 pub(super) fn frame(recording: &Recording, t: usize, look: &Look) -> Result<Drawing, PictureError> {
     let scene = scene(recording, t, look)?;
     let legend = Legend::whole(recording, look);
-    Ok(of_state(recording, t, look, scene, &legend))
+    of_state(recording, t, look, scene, &legend)
 }
 
 fn of_state(
@@ -71,7 +68,7 @@ fn of_state(
     look: &Look,
     scene: Scene,
     legend: &Legend,
-) -> Drawing {
+) -> Result<Drawing, PictureError> {
     let steps = recording.steps();
     let panel = Panel {
         scene,
@@ -113,10 +110,8 @@ pub(super) fn damage(
     let panels = panels.map(|(scene, when)| {
         let members = scene.robots.iter().filter(|robot| robot.ink == Ink::Named);
         let (members, robots) = (members.count(), scene.robots.len());
-        let count = match look.colouring {
-            Colouring::Structure if recording.name().is_some() => {
-                format!("{} {members} of {robots}", named(recording))
-            }
+        let count = match (look.colouring, recording.name()) {
+            (Colouring::Structure, Some(name)) => format!("{name} {members} of {robots}"),
             _ => format!("{robots} robots"),
         };
         Panel {
@@ -126,7 +121,7 @@ pub(super) fn damage(
         }
     });
     let title = format!("{}; {}", panels[0].left.words, panels[1].left.words);
-    Ok(self::panels(&title, &panels, &legend, look))
+    self::panels(&title, &panels, &legend, look)
 }
 
 fn scene(recording: &Recording, t: usize, look: &Look) -> Result<Scene, PictureError> {
@@ -144,31 +139,62 @@ fn scene(recording: &Recording, t: usize, look: &Look) -> Result<Scene, PictureE
     Ok(Scene::of(recording, t, look.colouring, look.robot))
 }
 
-fn panels(title: &str, panels: &[Panel], legend: &Legend, look: &Look) -> Drawing {
+/// Width of a panel and side of a cell: on a screen the cells say how large a picture gets, on
+/// paper its width how large they get.
+fn layout(
+    panels: &[Panel],
+    legend: &Legend,
+    size: Size,
+    gap: f64,
+) -> Result<(f64, f64), PictureError> {
+    let count = panels.len() as f64;
+    let (columns, rows) = cells(panels);
+    let captions = panels.iter().flat_map(|panel| [&panel.left, &panel.right]);
+    let widest = captions.map(|caption| caption.width(size));
+    let widest = widest.fold(0.0, f64::max);
+    match size {
+        Size::Paper(width) => {
+            let between = gap * (count - 1.0);
+            // Between panels, words may reach into the gap.
+            let captions = count * widest + between / 2.0;
+            let needed = captions.max(legend.widest(size)) + 2.0 * size.margin();
+            if needed > width {
+                let needed = needed.ceil() as u32;
+                return Err(PictureError::TooNarrow { needed });
+            }
+            let panel = (width - 2.0 * size.margin() - between) / count;
+            Ok((panel, panel / columns.max(rows)))
+        }
+        Size::Screen(side) => {
+            let side = f64::from(side);
+            let words = widest.max(legend.widest(size));
+            // A pixel more, for the line at the end.
+            Ok((size.whole((columns * side + 1.0).max(words)), side))
+        }
+    }
+}
+
+/// Cells of the widest and of the highest panel.
+fn cells(panels: &[Panel]) -> (f64, f64) {
+    let most = |of: fn(&Scene) -> u16| {
+        let sides = panels.iter().map(|panel| f64::from(of(&panel.scene)));
+        sides.fold(1.0, f64::max)
+    };
+    (most(|scene| scene.width), most(|scene| scene.height))
+}
+
+fn panels(
+    title: &str,
+    panels: &[Panel],
+    legend: &Legend,
+    look: &Look,
+) -> Result<Drawing, PictureError> {
     let size = look.size;
     let (words, margin) = (size.words(), size.margin());
     let gap = size.whole(1.5 * words);
     let count = panels.len() as f64;
-    let cells = |of: fn(&Scene) -> u16| {
-        let sides = panels.iter().map(|panel| f64::from(of(&panel.scene)));
-        sides.fold(1.0, f64::max)
-    };
-    let (columns, rows) = (cells(|scene| scene.width), cells(|scene| scene.height));
-    // On a screen the cells say how large it gets, on paper the width how large they get.
-    let (panel, side) = match size {
-        Size::Paper(width) => {
-            let panel = (width - 2.0 * margin - gap * (count - 1.0)) / count;
-            (panel, panel / columns.max(rows))
-        }
-        Size::Screen(side) => {
-            let side = f64::from(side);
-            let captions = panels.iter().flat_map(|panel| [&panel.left, &panel.right]);
-            let widest = captions.map(|caption| caption.width(size));
-            let widest = widest.fold(legend.widest(size), f64::max);
-            // A pixel more, for the line at the end.
-            (size.whole((columns * side + 1.0).max(widest)), side)
-        }
-    };
+    let (panel, side) = layout(panels, legend, size, gap)?;
+    let (columns, rows) = cells(panels);
     let width = panel * count + gap * (count - 1.0) + 2.0 * margin;
     let line_height = size.whole(1.5 * words);
     let one_line = panels
@@ -203,7 +229,7 @@ fn panels(title: &str, panels: &[Panel], legend: &Legend, look: &Look) -> Drawin
     let below = header + size.whole(rows * side) + 1.1 * words;
     let last = legend.draw(&mut drawing, (margin, below), width - 2.0 * margin);
     drawing.set_size(width, size.whole(last + margin));
-    drawing
+    Ok(drawing)
 }
 
 fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f64), side: f64) {
