@@ -51,7 +51,7 @@ enum Command {
         json: bool,
     },
     /// Look at a run: in the terminal, or as a page or pictures.
-    Replay(ReplayArgs),
+    Replay(Box<ReplayArgs>),
     /// Evaluate a genome from new starts, on other grids, with other noise and swarm sizes.
     Evaluate(EvaluateArgs),
     /// Take a part of what a swarm formed away, or scatter it, and see what the swarm does.

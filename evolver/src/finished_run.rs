@@ -29,6 +29,8 @@ pub struct FinishedRun {
     pub hash: String,
     /// The hash of its steps; a run of an older program has none.
     pub steps_hash: Option<String>,
+    /// Best fitness of every generation.
+    pub best_fitness: Vec<f64>,
 }
 
 /// A run directory cannot be read back.
@@ -59,6 +61,14 @@ pub enum ReadRunError {
     /// A final state is not one.
     #[error(transparent)]
     State(#[from] StateError),
+    /// The table of the generations is not one.
+    #[error("{}: {error}", path.display())]
+    Generations {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where.
+        error: csv::Error,
+    },
     /// The directory's files do not belong together.
     #[error("{}: {problem}", path.display())]
     Inconsistent {
@@ -133,6 +143,12 @@ pub struct FinalState {
     pub steps_hash: Option<String>,
 }
 
+/// What is read of a line of `generations.csv`.
+#[derive(Deserialize)]
+struct GenerationLine {
+    best_fitness: f64,
+}
+
 #[derive(Deserialize)]
 struct VersionOnly {
     schema_version: u32,
@@ -191,13 +207,30 @@ pub fn parse_final_state(path: &Path, bytes: &[u8]) -> Result<FinalState, StateE
     })
 }
 
+fn best_fitness(path: &Path) -> Result<Vec<f64>, ReadRunError> {
+    csv::Reader::from_reader(files::read(path)?.as_slice())
+        .deserialize()
+        .map(|line| line.map(|line: GenerationLine| line.best_fitness))
+        .collect::<Result<_, _>>()
+        .map_err(|error| ReadRunError::Generations {
+            path: path.to_owned(),
+            error,
+        })
+}
+
 impl FinishedRun {
     /// Reads a run directory.
     ///
     /// # Errors
     /// [`ReadRunError`] if the run is not complete, or a file in it is wrong.
     pub fn read(path: &Path) -> Result<Self, ReadRunError> {
-        for missing in ["DONE", "config.toml", "best.genome", "final.json"] {
+        for missing in [
+            "DONE",
+            "config.toml",
+            "best.genome",
+            "final.json",
+            "generations.csv",
+        ] {
             if !path.join(missing).is_file() {
                 return Err(ReadRunError::NotComplete {
                     path: path.to_owned(),
@@ -231,6 +264,12 @@ impl FinishedRun {
         {
             return inconsistent("final.json has another grid or swarm size than config.toml");
         }
+        let best_fitness = best_fitness(&path.join("generations.csv"))?;
+        if best_fitness.len() != settings.generations as usize {
+            return inconsistent(
+                "generations.csv has another number of lines than config.toml has generations",
+            );
+        }
         let hash = files::read(&path.join("DONE"))?;
         Ok(Self {
             genome: encoded.to_genome(),
@@ -240,6 +279,7 @@ impl FinishedRun {
             final_poses: state.final_poses,
             hash: String::from_utf8_lossy(&hash).trim().to_owned(),
             steps_hash: state.steps_hash,
+            best_fitness,
             settings,
         })
     }

@@ -12,6 +12,7 @@ pub mod hil;
 pub mod import;
 pub mod inspect;
 pub mod monitor;
+pub mod pictures;
 pub mod replay;
 pub mod suite;
 

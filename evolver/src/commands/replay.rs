@@ -3,6 +3,7 @@
 use super::conditions::GenomeConditions;
 use super::damage::corners;
 use super::evaluate::flag;
+use super::pictures::PictureArgs;
 use super::{BadInput, read_genome};
 use crate::files;
 use crate::finished_run::FinishedRun;
@@ -53,6 +54,8 @@ pub struct ReplayArgs {
     /// What the colours of robots say.
     #[arg(long, value_enum, default_value_t)]
     colour: Colouring,
+    #[command(flatten)]
+    pictures: PictureArgs,
 }
 
 /// Shows a run.
@@ -60,6 +63,7 @@ pub struct ReplayArgs {
 /// # Errors
 /// [`BadInput`] if there is nothing to look at, or a flag does not fit.
 pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
+    arguments.pictures.refuse_existing()?;
     let recording = recording(arguments)?;
     if recording.steps() == 0 {
         return Err(BadInput::new(format!(
@@ -67,6 +71,9 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
             arguments.run.display()
         ))
         .into());
+    }
+    if arguments.pictures.is_any() {
+        return arguments.pictures.write(&recording, arguments.colour);
     }
     let stop = stop_on_signal()?;
     in_terminal(&recording, arguments.colour, &stop)
@@ -82,9 +89,10 @@ pub(super) fn in_terminal(
     stop: &AtomicBool,
 ) -> anyhow::Result<()> {
     terminal::play(recording, colouring, stop).map_err(|error| match error {
-        PlayError::NotATerminal => {
-            BadInput::new(format!("{error}; --html FILE writes a page instead")).into()
-        }
+        PlayError::NotATerminal => BadInput::new(format!(
+            "{error}; --html, --svg, --png, --gif and --mp4 write files instead"
+        ))
+        .into(),
         error => error.into(),
     })
 }

@@ -4,6 +4,7 @@
 //! one state of it to draw, in the colours of [`palette`]; everything else here draws scenes.
 
 pub mod palette;
+pub mod pictures;
 pub mod recording;
 pub mod scene;
 pub mod terminal;

@@ -251,10 +251,8 @@ impl Recording {
     /// Whether a robot belongs to a structure in state `t`.
     #[must_use]
     pub fn is_member(&self, t: usize, robot: usize, structure: Structure) -> bool {
-        let bit = Structure::ALL.iter().position(|&s| s == structure);
         let members = self.members.get(t).and_then(|robots| robots.get(robot));
-        bit.zip(members)
-            .is_some_and(|(bit, members)| members >> bit & 1 == 1)
+        members.is_some_and(|&members| is_in(members, structure))
     }
 
     /// The structure that the final state is named after, of tied ones the first in the paper's
@@ -291,11 +289,13 @@ fn origin(name: &str, finished: &FinishedRun) -> Origin {
         seed: Some(finished.settings.seed),
         run_hash: Some(finished.hash.clone()),
         noise: finished.settings.written.noise,
+        evolution: finished.best_fitness.clone(),
         ..Origin::default()
     }
 }
 
-fn members(grid: Grid, poses: &[Pose]) -> Result<Vec<u8>, WorldError> {
+/// The structures that every robot belongs to: bit `i` for `Structure::ALL[i]`.
+pub(super) fn members(grid: Grid, poses: &[Pose]) -> Result<Vec<u8>, WorldError> {
     let found = classify(grid, poses)?;
     Ok((0..poses.len() as u32)
         .map(|robot| {
@@ -304,4 +304,10 @@ fn members(grid: Grid, poses: &[Pose]) -> Result<Vec<u8>, WorldError> {
             })
         })
         .collect())
+}
+
+/// Whether a robot of [`members`] belongs to a structure.
+pub(super) fn is_in(members: u8, structure: Structure) -> bool {
+    let bit = Structure::ALL.iter().position(|&s| s == structure);
+    bit.is_some_and(|bit| members >> bit & 1 == 1)
 }

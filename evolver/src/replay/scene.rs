@@ -2,7 +2,7 @@
 //! marked on the cells. Every back end draws scenes and knows nothing else of a run; the page has
 //! this file's rules once more in its script, and a test compares the two.
 
-use super::recording::Recording;
+use super::recording::{Recording, is_in, members};
 use minimal_surprise_controller::SensorBits;
 use minimal_surprise_sim::{Pose, Structure};
 use serde::Serialize;
@@ -123,14 +123,23 @@ impl Scene {
         }
     }
 
-    /// A swarm without anything else known of it, as before damage.
+    /// A swarm of which only the poses are known, as before damage. Its robots are coloured by
+    /// structure if they are at all.
     #[must_use]
-    pub fn of_poses(recording: &Recording, poses: &[Pose]) -> Self {
+    pub fn of_poses(recording: &Recording, poses: &[Pose], colouring: Colouring) -> Self {
+        let members = match colouring {
+            Colouring::Structure => members(recording.grid, poses).unwrap_or_default(),
+            Colouring::Surprise | Colouring::Plain => Vec::new(),
+        };
+        let robots = poses.iter().enumerate();
+        let robots = robots.map(|(robot, &pose)| {
+            let ink = members.get(robot).map_or(Ink::Plain, |&members| {
+                ink_of_member(|s| is_in(members, s), recording.name())
+            });
+            robot_at(pose, ink)
+        });
         Self {
-            robots: poses
-                .iter()
-                .map(|&pose| robot_at(pose, Ink::Plain))
-                .collect(),
+            robots: robots.collect(),
             ..Self::of(recording, 0, Colouring::Plain, None)
         }
     }
@@ -149,19 +158,19 @@ fn ink(recording: &Recording, t: usize, robot: usize, colouring: Colouring) -> I
     match colouring {
         Colouring::Plain => Ink::Plain,
         Colouring::Structure => {
-            let named = recording
-                .name()
-                .is_some_and(|s| recording.is_member(t, robot, s));
-            let any = Structure::ALL
-                .iter()
-                .any(|&s| recording.is_member(t, robot, s));
-            match (named, any) {
-                (true, _) => Ink::Named,
-                (false, true) => Ink::Other,
-                (false, false) => Ink::Outside,
-            }
+            ink_of_member(|s| recording.is_member(t, robot, s), recording.name())
         }
         Colouring::Surprise => surprise(recording, t, robot).map_or(Ink::Plain, Ink::Surprise),
+    }
+}
+
+fn ink_of_member(is_member: impl Fn(Structure) -> bool, name: Option<Structure>) -> Ink {
+    if name.is_some_and(&is_member) {
+        Ink::Named
+    } else if Structure::ALL.into_iter().any(is_member) {
+        Ink::Other
+    } else {
+        Ink::Outside
     }
 }
 

@@ -61,7 +61,9 @@ impl<'a> Player<'a> {
     #[must_use]
     pub fn scene(&self) -> Scene {
         match &self.recording.origin.damage {
-            Some(damage) if self.before => Scene::of_poses(self.recording, &damage.before),
+            Some(damage) if self.before => {
+                Scene::of_poses(self.recording, &damage.before, self.colouring)
+            }
             _ => Scene::of(self.recording, self.t, self.colouring, self.picked),
         }
     }

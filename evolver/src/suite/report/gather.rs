@@ -330,11 +330,6 @@ struct MetaFile {
     revision: String,
 }
 
-#[derive(Deserialize)]
-struct GenerationLine {
-    best_fitness: f64,
-}
-
 fn read_group(
     experiment: &str,
     settings: &PlannedSettings,
@@ -367,19 +362,13 @@ fn read_run(planned: &PlannedRun, directory: &Path) -> Result<Option<Run>, Repor
     let meta: MetaFile = json(&directory.join("meta.json"))?;
     // Nothing of what is said depends on it; a run of an older program has none.
     let time = files::read(&directory.join("time.json")).unwrap_or_default();
-    let path = directory.join("generations.csv");
-    let best_fitness = csv::Reader::from_reader(files::read(&path)?.as_slice())
-        .deserialize()
-        .map(|line| line.map(|line: GenerationLine| line.best_fitness))
-        .collect::<Result<_, _>>()
-        .map_err(|error| ReportError::Csv { path, error })?;
     let found = classify(finished.settings.scenario.grid(), &finished.final_poses)?;
     Ok(Some(Run {
         id: planned.id.clone(),
         names: found.names(),
         shares: Structure::ALL.map(|structure| found.share(structure)),
         lines: found.line_counts(),
-        best_fitness,
+        best_fitness: finished.best_fitness.clone(),
         movement: state.measures.movement,
         intended_movement: state.measures.intended_movement,
         temperature: state.measures.temperature,

@@ -53,14 +53,6 @@ pub enum ReportError {
         /// What is wrong.
         error: serde_json::Error,
     },
-    /// A file of a run is not the CSV that it should be.
-    #[error("{}: {error}", path.display())]
-    Csv {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        error: csv::Error,
-    },
     /// A final state is not one.
     #[error(transparent)]
     World(#[from] WorldError),

@@ -1,0 +1,258 @@
+//! `evolver replay` into files: stills and animations.
+
+use super::BadInput;
+use super::evaluate::flag;
+use crate::files;
+use crate::replay::palette::{DARK, LIGHT, Theme};
+use crate::replay::pictures::film::Film;
+use crate::replay::pictures::raster::png;
+use crate::replay::pictures::{Drawing, Look, PictureError, Size, What, still};
+use crate::replay::recording::Recording;
+use crate::replay::scene::Colouring;
+use crate::settings::count;
+use clap::{ArgGroup, Args, ValueEnum};
+use std::path::{Path, PathBuf};
+
+/// Which pictures to write, and what they look like.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Pictures")]
+#[command(group = ArgGroup::new("still").args(["svg", "png"]).multiple(true))]
+#[command(group = ArgGroup::new("film").args(["gif", "mp4"]).multiple(true))]
+#[command(group = ArgGroup::new("picture").args(["svg", "png", "gif", "mp4"]).multiple(true))]
+pub struct PictureArgs {
+    /// Write a still as SVG; the file must not exist.
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Write a still as PNG; the file must not exist.
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
+    /// Write an animation as GIF; the file must not exist.
+    #[arg(long, value_name = "FILE")]
+    gif: Option<PathBuf>,
+    /// Write an animation as MP4, by the program ffmpeg; the file must not exist.
+    #[arg(long, value_name = "FILE")]
+    mp4: Option<PathBuf>,
+    /// What a still shows [default: damage after --remove or --reposition, else state].
+    #[arg(long, value_enum, requires = "still")]
+    what: Option<What>,
+    /// The state that a still shows, 0 to the number of steps [default: the last].
+    #[arg(long, value_name = "T", requires = "still", allow_hyphen_values = true)]
+    at: Option<String>,
+    /// Look into this robot: mark what it senses and predicted.
+    #[arg(
+        long,
+        value_name = "N",
+        requires = "picture",
+        allow_hyphen_values = true
+    )]
+    robot: Option<String>,
+    /// On which ground.
+    #[arg(long, value_enum, default_value_t, requires = "picture")]
+    theme: Ground,
+    /// Width of a still, in millimetres; the default is a column of a paper.
+    #[arg(
+        long,
+        value_name = "MM",
+        default_value = "85",
+        requires = "still",
+        allow_hyphen_values = true
+    )]
+    width_mm: String,
+    /// Dots an inch of a PNG.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "300",
+        requires = "png",
+        allow_hyphen_values = true
+    )]
+    dpi: String,
+    /// Side of a cell in an animation, in pixels.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "16",
+        requires = "film",
+        allow_hyphen_values = true
+    )]
+    cell_px: String,
+    /// Steps between two frames of an animation [default: about a hundred frames].
+    #[arg(long, value_name = "N", requires = "film", allow_hyphen_values = true)]
+    every: Option<String>,
+    /// Frames a second of an animation.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "10",
+        requires = "film",
+        allow_hyphen_values = true
+    )]
+    fps: String,
+}
+
+/// Light or dark.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Ground {
+    /// Dark on light.
+    #[default]
+    Light,
+    /// Light on dark.
+    Dark,
+}
+
+impl Ground {
+    fn theme(self) -> &'static Theme {
+        match self {
+            Self::Light => &LIGHT,
+            Self::Dark => &DARK,
+        }
+    }
+}
+
+/// What an animation without `--every` has about as many frames as.
+const FRAMES: usize = 100;
+
+impl PictureArgs {
+    fn files(&self) -> [(&'static str, Option<&Path>); 4] {
+        [
+            ("svg", self.svg.as_deref()),
+            ("png", self.png.as_deref()),
+            ("gif", self.gif.as_deref()),
+            ("mp4", self.mp4.as_deref()),
+        ]
+    }
+
+    /// Whether any picture is to be written.
+    pub(super) fn is_any(&self) -> bool {
+        self.files().iter().any(|(_, file)| file.is_some())
+    }
+
+    /// Refuses files that exist, before anything is computed.
+    ///
+    /// # Errors
+    /// [`BadInput`] names the flag and the file.
+    pub(super) fn refuse_existing(&self) -> Result<(), BadInput> {
+        for (flag, file) in self.files() {
+            if let Some(file) = file.filter(|file| file.symlink_metadata().is_ok()) {
+                return Err(BadInput::new(format!(
+                    "--{flag} = {}: it exists, and nothing is overwritten; name another",
+                    file.display()
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the pictures.
+    ///
+    /// # Errors
+    /// [`BadInput`] names the flag, the value and what would be valid.
+    pub(super) fn write(&self, recording: &Recording, colouring: Colouring) -> anyhow::Result<()> {
+        let width = flag("width-mm", &self.width_mm, |text| between(text, 40, 500))?;
+        let dpi = flag("dpi", &self.dpi, |text| between(text, 50, 1200))?;
+        let cell = flag("cell-px", &self.cell_px, |text| between(text, 4, 64))?;
+        let fps = flag("fps", &self.fps, |text| count(text, 50))?;
+        let steps = recording.steps() as u32;
+        let every = match &self.every {
+            Some(text) => flag("every", text, |text| count(text, steps))?,
+            None => recording.steps().div_ceil(FRAMES) as u32,
+        };
+        let robot = match &self.robot {
+            Some(text) => Some(flag("robot", text, number)? as usize),
+            None => None,
+        };
+        let at = match &self.at {
+            Some(text) => Some(flag("at", text, number)?),
+            None => None,
+        };
+        let what = self.what.unwrap_or(match recording.origin.damage {
+            Some(_) => What::Damage,
+            None => What::State,
+        });
+        if let (Some(at), false) = (at, matches!(what, What::State | What::Damage)) {
+            let what = what.to_possible_value();
+            let what = what.as_ref().map_or("", |value| value.get_name());
+            return Err(BadInput::new(format!(
+                "--at = {at}: --what = {what} shows the whole run; only state and damage are of one state"
+            ))
+            .into());
+        }
+        let look = |size| Look {
+            size,
+            theme: self.theme.theme(),
+            colouring,
+            robot,
+        };
+        if self.svg.is_some() || self.png.is_some() {
+            let look = look(Size::Paper(f64::from(width)));
+            let drawing = still(recording, what, at, &look).map_err(|error| self.about(error))?;
+            self.write_still(&drawing, dpi)?;
+        }
+        let look = look(Size::Screen(cell));
+        let film = Film {
+            recording,
+            look: &look,
+            every,
+            frames_per_second: fps,
+        };
+        if let Some(file) = &self.gif {
+            write(file, &film.gif().map_err(|error| self.about(error))?)?;
+        }
+        if let Some(file) = &self.mp4 {
+            match film.mp4() {
+                Ok(bytes) => write(file, &bytes)?,
+                Err(error @ (PictureError::Ffmpeg(_) | PictureError::FfmpegFailed(_))) => {
+                    return Err(error.into());
+                }
+                Err(error) => return Err(self.about(error).into()),
+            }
+        }
+        Ok(())
+    }
+
+    fn write_still(&self, drawing: &Drawing, dpi: u32) -> anyhow::Result<()> {
+        if let Some(file) = &self.svg {
+            write(file, drawing.svg().as_bytes())?;
+        }
+        if let Some(file) = &self.png {
+            write(file, &png(drawing, dpi).map_err(|error| self.about(error))?)?;
+        }
+        Ok(())
+    }
+
+    /// Says which flag asked for what cannot be had.
+    fn about(&self, error: PictureError) -> BadInput {
+        let given = |flag: &str, value: &Option<String>| {
+            let value = value.as_deref().unwrap_or_default();
+            BadInput::new(format!("--{flag} = {value}: {error}"))
+        };
+        match &error {
+            PictureError::NoState { .. } => given("at", &self.at),
+            PictureError::NoRobot { .. } => given("robot", &self.robot),
+            PictureError::TooNarrow { .. } => {
+                BadInput::new(format!("--width-mm = {}: {error}", self.width_mm))
+            }
+            PictureError::NoFfmpeg => {
+                let file = self.mp4.as_ref().map(|file| file.display().to_string());
+                given("mp4", &file)
+            }
+            _ => BadInput::new(error),
+        }
+    }
+}
+
+fn write(file: &Path, bytes: &[u8]) -> Result<(), BadInput> {
+    files::replace(file, bytes).map_err(BadInput::new)
+}
+
+fn number(text: &str) -> Result<u32, String> {
+    text.parse()
+        .map_err(|_| "expected a whole number, 0 or more".to_owned())
+}
+
+fn between(text: &str, least: u32, most: u32) -> Result<u32, String> {
+    match text.parse() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("expected a whole number from {least} to {most}")),
+    }
+}

@@ -1,0 +1,95 @@
+//! Pictures as pixels.
+
+use super::{Drawing, PictureError};
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::{Options, Tree};
+
+/// Most pixels of a picture, 8 × 8 thousand.
+const PIXELS_MAX: f64 = 64e6;
+
+/// Millimetres of an inch.
+const INCH: f64 = 25.4;
+
+/// A picture of pixels, from the north-west corner by rows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pixels {
+    /// Pixels of a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Red, green and blue of each.
+    pub rgb: Vec<u8>,
+}
+
+impl Pixels {
+    /// A picture so many pixels wide.
+    ///
+    /// # Errors
+    /// [`PictureError::TooLarge`].
+    pub fn of(drawing: &Drawing, width: u32) -> Result<Self, PictureError> {
+        let tree = Tree::from_str(&drawing.svg(), &Options::default())
+            .map_err(|error| PictureError::Encoding(error.to_string()))?;
+        let scale = f64::from(width) / f64::from(tree.size().width());
+        let height = (f64::from(tree.size().height()) * scale).round().max(1.0);
+        let too_large = PictureError::TooLarge {
+            width: f64::from(width),
+            height,
+        };
+        if f64::from(width) * height > PIXELS_MAX {
+            return Err(too_large);
+        }
+        let Some(mut pixmap) = Pixmap::new(width, height as u32) else {
+            return Err(too_large);
+        };
+        let scale = scale as f32;
+        resvg::render(
+            &tree,
+            Transform::from_scale(scale, scale),
+            &mut pixmap.as_mut(),
+        );
+        // The ground is opaque, so nothing is seen through.
+        let rgb = pixmap.data().chunks_exact(4).flat_map(|pixel| {
+            let [red, green, blue, _] = [pixel[0], pixel[1], pixel[2], pixel[3]];
+            [red, green, blue]
+        });
+        Ok(Self {
+            width,
+            height: pixmap.height(),
+            rgb: rgb.collect(),
+        })
+    }
+
+    /// One pixel a pixel, for a drawing of [`super::Size::Screen`].
+    ///
+    /// # Errors
+    /// [`PictureError::TooLarge`].
+    pub fn of_screen(drawing: &Drawing) -> Result<Self, PictureError> {
+        Self::of(drawing, drawing.width().ceil() as u32)
+    }
+}
+
+/// A drawing of [`super::Size::Paper`] as PNG of so many dots an inch.
+///
+/// # Errors
+/// [`PictureError::TooLarge`].
+pub fn png(drawing: &Drawing, dots_per_inch: u32) -> Result<Vec<u8>, PictureError> {
+    let dots = f64::from(dots_per_inch);
+    let pixels = Pixels::of(drawing, (drawing.width() / INCH * dots).round() as u32)?;
+    let mut info = png::Info::with_size(pixels.width, pixels.height);
+    info.color_type = png::ColorType::Rgb;
+    info.bit_depth = png::BitDepth::Eight;
+    let per_metre = (dots / INCH * 1000.0).round() as u32;
+    info.pixel_dims = Some(png::PixelDimensions {
+        xppu: per_metre,
+        yppu: per_metre,
+        unit: png::Unit::Meter,
+    });
+    let encode = || {
+        let mut bytes = Vec::new();
+        let mut writer = png::Encoder::with_info(&mut bytes, info)?.write_header()?;
+        writer.write_image_data(&pixels.rgb)?;
+        writer.finish()?;
+        Ok(bytes)
+    };
+    encode().map_err(|error: png::EncodingError| PictureError::Encoding(error.to_string()))
+}

@@ -1,0 +1,501 @@
+//! Pictures of a run: `evolver replay` into SVG, PNG, GIF and MP4.
+//!
+//! `UPDATE_SNAPSHOTS=1` writes the files in `snapshots/` anew; look at them before they are kept.
+
+use minimal_surprise_sim::Pose;
+use minimal_surprise_sim::exchange::Trajectory;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tests::program::{Evolver, Finished};
+
+/// A folder with a short run in `run`.
+fn with_a_run() -> Evolver {
+    let evolver = Evolver::in_empty_folder();
+    let short = "evolve --population 6 --generations 3 --repetitions 2 --steps 60 --robots 60 \
+                 --seed 4 --out run";
+    let run = evolver.run(&words(short));
+    assert_eq!(run.code, Some(0), "{run:?}");
+    evolver
+}
+
+fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
+fn replay(evolver: &Evolver, line: &str) {
+    let run = evolver.run(&words(&format!("replay {line}")));
+    assert_eq!(run.code, Some(0), "{line}: {run:?}");
+    assert_eq!(run.stderr, "", "{line}");
+}
+
+fn assert_refused(run: &Finished, words: &[&str]) {
+    assert_eq!(run.code, Some(2), "{run:?}");
+    for word in words {
+        assert!(run.stderr.contains(word), "no {word:?} in {run:?}");
+    }
+    assert_eq!(run.stderr.trim_end().lines().count(), 1, "{run:?}");
+}
+
+/// Red, green and blue of every pixel, by rows.
+#[derive(Clone, PartialEq, Eq)]
+struct Pixels {
+    width: usize,
+    height: usize,
+    rgb: Vec<[u8; 3]>,
+}
+
+impl Pixels {
+    fn at(&self, x: usize, y: usize) -> [u8; 3] {
+        self.rgb[y * self.width + x]
+    }
+}
+
+fn png_pixels(bytes: &[u8]) -> (Pixels, Option<u32>) {
+    let decoder = png::Decoder::new(std::io::Cursor::new(bytes));
+    let mut reader = decoder.read_info().expect("a PNG");
+    let mut rgb = vec![0; reader.output_buffer_size().expect("it fits")];
+    let info = reader.next_frame(&mut rgb).expect("a whole PNG");
+    assert_eq!(info.color_type, png::ColorType::Rgb);
+    let pixels = Pixels {
+        width: info.width as usize,
+        height: info.height as usize,
+        rgb: rgb.as_chunks::<3>().0.to_vec(),
+    };
+    let per_metre = reader.info().pixel_dims.map(|dims| dims.xppu);
+    (pixels, per_metre)
+}
+
+/// Every frame of a GIF as it is seen, and for how many hundredths of a second.
+fn gif_frames(bytes: &[u8]) -> Vec<(Pixels, u16)> {
+    let mut reader = gif::DecodeOptions::new().read_info(bytes).expect("a GIF");
+    let width = usize::from(reader.width());
+    let height = usize::from(reader.height());
+    let palette = reader.global_palette().expect("one palette").to_vec();
+    let mut seen = Pixels {
+        width,
+        height,
+        rgb: vec![[0; 3]; width * height],
+    };
+    let mut frames = Vec::new();
+    while let Some(frame) = reader.read_next_frame().expect("a whole GIF") {
+        assert!(frame.palette.is_none(), "the palette is the GIF's");
+        for (index, &colour) in frame.buffer.iter().enumerate() {
+            if Some(colour) != frame.transparent {
+                let x = usize::from(frame.left) + index % usize::from(frame.width);
+                let y = usize::from(frame.top) + index / usize::from(frame.width);
+                let at = 3 * usize::from(colour);
+                let rgb = palette[at..at + 3].try_into().expect("three");
+                seen.rgb[y * width + x] = rgb;
+            }
+        }
+        frames.push((seen.clone(), frame.delay));
+    }
+    frames
+}
+
+fn snapshot(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("snapshots");
+    folder.join(name)
+}
+
+/// Compares a picture in the folder with the snapshot of the same name.
+fn assert_as_kept(evolver: &Evolver, name: &str) {
+    let file = snapshot(name);
+    let made = evolver.read(name);
+    if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
+        fs::write(&file, &made).expect("it can be written");
+    }
+    let kept = fs::read(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    let same = if name.ends_with(".png") {
+        png_pixels(&made) == png_pixels(&kept)
+    } else {
+        made == kept
+    };
+    let there = std::env::temp_dir().join(name);
+    if !same {
+        fs::write(&there, &made).expect("it can be written");
+    }
+    assert!(
+        same,
+        "{name} is not as in tests/snapshots; it is now in {}",
+        there.display()
+    );
+}
+
+#[test]
+fn stills_are_drawn_as_they_were() {
+    let evolver = with_a_run();
+    let stills = [
+        ("final-state", ""),
+        (
+            "robot-dark",
+            "--at 30 --robot 7 --colour surprise --theme dark",
+        ),
+        ("damage", "--reposition 12,2,3,7 --at 20"),
+    ];
+    for (name, flags) in stills {
+        let line = format!("run {flags} --svg {name}.svg --png {name}.png --dpi 100");
+        replay(&evolver, &line);
+        assert_as_kept(&evolver, &format!("{name}.svg"));
+        assert_as_kept(&evolver, &format!("{name}.png"));
+    }
+}
+
+#[test]
+fn a_still_has_the_width_of_a_column_and_words_of_seven_points() {
+    let evolver = with_a_run();
+    replay(&evolver, "run --svg a.svg --png a.png");
+    let svg = evolver.text("a.svg");
+    assert!(svg.contains("width=\"85mm\""), "{svg:.200}");
+    assert!(!svg.contains("<text"), "words are outlines");
+    let (pixels, per_metre) = png_pixels(&evolver.read("a.png"));
+    // 85 mm of 300 dots an inch.
+    assert_eq!((pixels.width, per_metre), (1004, Some(11811)));
+    replay(
+        &evolver,
+        "run --svg b.svg --png b.png --width-mm 170 --dpi 100",
+    );
+    assert!(evolver.text("b.svg").contains("width=\"170mm\""));
+    let (pixels, per_metre) = png_pixels(&evolver.read("b.png"));
+    assert_eq!((pixels.width, per_metre), (669, Some(3937)));
+}
+
+#[test]
+fn predictions_and_curves_are_drawn_with_their_names_and_numbers() {
+    let evolver = with_a_run();
+    let shown = [
+        ("predictions", &["average predictions, ", "0."][..]),
+        ("temperature", &["time step", "temperature", "60", "0.1"]),
+        ("fitness", &["generation", "best fitness", "0.5"]),
+    ];
+    for (what, words) in shown {
+        replay(
+            &evolver,
+            &format!("run --what {what} --svg {what}.svg --png {what}.png"),
+        );
+        let svg = evolver.text(&format!("{what}.svg"));
+        for word in words {
+            let label = format!("aria-label=\"{word}");
+            assert!(svg.contains(&label), "no {word:?} in {what}");
+        }
+        let (pixels, _) = png_pixels(&evolver.read(&format!("{what}.png")));
+        assert_eq!(pixels.width, 1004, "{what}");
+    }
+    let predictions = evolver.text("predictions.svg");
+    let averages = predictions.matches("aria-label=\"").count() - 1;
+    assert_eq!(averages, 14, "sensor model C has as many sensors");
+}
+
+const CELL: [u8; 3] = [0xf4, 0xf4, 0xf2];
+const LINE: [u8; 3] = [0xdc, 0xdc, 0xd8];
+const ROBOT: [u8; 3] = [0x2b, 0x2b, 0x29];
+
+/// What is seen of poses on a grid with cells of so many pixels, robots plain.
+fn poses_seen(frame: &Pixels, cells: (usize, usize), side: usize) -> Vec<Pose> {
+    // The grid begins with a line.
+    let corner = frame.rgb.iter().position(|&colour| colour == LINE);
+    let corner = corner.expect("there is a grid");
+    let (west, north) = (corner % frame.width, corner / frame.width);
+    let mut seen = Vec::new();
+    for y in 0..cells.1 {
+        for x in 0..cells.0 {
+            let quarter = |right: usize, down: usize| {
+                frame.at(
+                    west + x * side + right * side / 4,
+                    north + (cells.1 - 1 - y) * side + down * side / 4,
+                )
+            };
+            // East, north, west, south; behind a robot its outline is notched.
+            let around = [(3, 2), (2, 1), (1, 2), (2, 3)].map(|(x, y)| quarter(x, y));
+            if quarter(2, 2) == ROBOT {
+                let ahead: Vec<usize> = (0..4)
+                    .filter(|&heading| {
+                        around[heading] == ROBOT && around[(heading + 2) % 4] == CELL
+                    })
+                    .collect();
+                assert_eq!(ahead.len(), 1, "one way ahead at {x}, {y}: {around:?}");
+                let heading = u8::try_from(ahead[0]).unwrap().try_into().unwrap();
+                seen.push(Pose {
+                    x: x as u16,
+                    y: y as u16,
+                    heading,
+                });
+            } else {
+                assert_eq!(quarter(2, 2), CELL, "at {x}, {y}");
+            }
+        }
+    }
+    seen
+}
+
+fn by_cell(poses: &[Pose]) -> Vec<(u16, u16, u8)> {
+    let mut cells: Vec<_> = poses
+        .iter()
+        .map(|pose| (pose.y, pose.x, pose.heading as u8))
+        .collect();
+    cells.sort_unstable();
+    cells
+}
+
+#[test]
+fn every_frame_of_a_gif_shows_the_poses_of_its_state() {
+    let evolver = with_a_run();
+    let exported = evolver.run(&words("export run --format trajectory --out trajectory"));
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+    let trajectory = Trajectory::read(&evolver.text("trajectory")).expect("a trajectory");
+    // Of the run and of its trajectory the same is seen.
+    for from in ["run", "trajectory"] {
+        replay(
+            &evolver,
+            &format!("{from} --gif {from}.gif --colour plain --every 25 --cell-px 20 --fps 5"),
+        );
+        let frames = gif_frames(&evolver.read(&format!("{from}.gif")));
+        let delays: Vec<u16> = frames.iter().map(|&(_, delay)| delay).collect();
+        assert_eq!(delays, [20, 20, 20, 200], "steps 0, 25, 50 and the last");
+        for ((frame, _), t) in frames.iter().zip([0, 25, 50, 60]) {
+            let seen = poses_seen(frame, (15, 15), 20);
+            assert_eq!(
+                by_cell(&seen),
+                by_cell(&trajectory.states()[t]),
+                "{from} {t}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_readme_opens_with_what_its_first_commands_draw() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let readme = fs::read_to_string(root.join("README.md")).expect("there is one");
+    let picture = readme.split_once("](docs/").expect("a picture").1;
+    let picture = picture.split_once(')').expect("its end").0;
+    let commands: Vec<&str> = readme
+        .lines()
+        .filter_map(|line| line.strip_prefix("$ cargo run --release -- "))
+        .filter_map(|line| line.split('#').next())
+        .take(2)
+        .collect();
+    let evolver = Evolver::in_empty_folder();
+    for command in &commands {
+        let run = evolver.run(&words(command));
+        assert_eq!(run.code, Some(0), "{command}: {run:?}");
+    }
+    let kept = fs::read(root.join("docs").join(picture)).expect("the picture");
+    assert!(
+        kept == evolver.read(picture),
+        "{commands:?} draw another {picture}"
+    );
+}
+
+#[test]
+fn an_animation_has_about_a_hundred_frames_unless_said_otherwise() {
+    let evolver = Evolver::in_empty_folder();
+    let short = "evolve --population 4 --generations 1 --repetitions 1 --steps 350 --robots 9 \
+                 --grid 6x6 --out run";
+    assert_eq!(evolver.run(&words(short)).code, Some(0));
+    replay(&evolver, "run --gif a.gif");
+    assert_eq!(gif_frames(&evolver.read("a.gif")).len(), 89, "every fourth");
+    replay(&evolver, "run --gif b.gif --every 350 --colour surprise");
+    // The last state has no readings that could surprise.
+    assert_eq!(gif_frames(&evolver.read("b.gif")).len(), 2);
+}
+
+#[test]
+fn a_replay_is_the_same_whenever_it_is_drawn() {
+    let evolver = with_a_run();
+    for copy in ["a", "b"] {
+        replay(
+            &evolver,
+            &format!("run --svg {copy}.svg --png {copy}.png --gif {copy}.gif --robot 3"),
+        );
+    }
+    for kind in ["svg", "png", "gif"] {
+        let [a, b] = ["a", "b"].map(|copy| evolver.read(&format!("{copy}.{kind}")));
+        assert!(a == b, "{kind}");
+    }
+}
+
+/// A program of this name that does this, in a folder of its own.
+#[cfg(unix)]
+fn stand_in(evolver: &Evolver, script: &str) -> String {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = evolver.folder().join("programs");
+    fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("ffmpeg");
+    fs::write(&file, script).unwrap();
+    fs::set_permissions(&file, fs::Permissions::from_mode(0o755)).unwrap();
+    folder.to_string_lossy().into_owned()
+}
+
+#[cfg(unix)]
+#[test]
+fn ffmpeg_gets_the_frames_of_the_gif() {
+    let evolver = with_a_run();
+    // Its last argument is the file; only the shell's own and what /bin has is needed.
+    let keeps = "#!/bin/sh\nfor file; do :; done\n/bin/cat > \"$file\"\n";
+    let path = stand_in(&evolver, keeps);
+    let flags = "replay run --gif a.gif --mp4 a.mp4 --every 20 --fps 7";
+    let run = evolver.run_with(("PATH", &path), &words(flags));
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let frames = gif_frames(&evolver.read("a.gif"));
+    let piped: Vec<u8> = evolver.read("a.mp4");
+    let drawn: Vec<u8> = frames
+        .iter()
+        .flat_map(|(frame, _)| frame.rgb.as_flattened())
+        .copied()
+        .collect();
+    assert_eq!(frames.len(), 4);
+    assert!(piped == drawn, "{} and {} bytes", piped.len(), drawn.len());
+}
+
+#[cfg(unix)]
+#[test]
+fn without_ffmpeg_there_is_no_mp4_but_a_word_on_what_to_install() {
+    let evolver = with_a_run();
+    let flags = words("replay run --mp4 a.mp4");
+    let run = evolver.run_with(("PATH", "/nowhere"), &flags);
+    assert_refused(
+        &run,
+        &["--mp4 = a.mp4", "ffmpeg", "apt-get install", "--gif"],
+    );
+    let fails = "#!/bin/sh\necho 'Unknown encoder' >&2\nexit 3\n";
+    let path = stand_in(&evolver, fails);
+    let run = evolver.run_with(("PATH", &path), &flags);
+    assert_eq!(run.code, Some(1), "{run:?}");
+    assert!(
+        run.stderr.contains("ffmpeg failed: Unknown encoder"),
+        "{run:?}"
+    );
+    assert!(!evolver.folder().join("a.mp4").exists());
+}
+
+#[test]
+fn nothing_is_overwritten() {
+    let evolver = with_a_run();
+    for kind in ["svg", "png", "gif", "mp4"] {
+        let file = format!("a.{kind}");
+        evolver.write(&file, b"mine");
+        let line = format!("replay run --{kind} {file}");
+        let run = evolver.run(&words(&line));
+        assert_refused(&run, &[&format!("--{kind} = {file}"), "exists"]);
+        assert_eq!(evolver.text(&file), "mine");
+    }
+}
+
+#[test]
+fn what_a_run_does_not_have_is_refused() {
+    let evolver = with_a_run();
+    let exported = evolver.run(&words("export run --format trajectory --out trajectory"));
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+    let cases: [(&str, &[&str]); 19] = [
+        ("run --svg a --at 61", &["--at = 61", "0 to 60"]),
+        ("run --svg a --at -1", &["--at = -1", "0 or more"]),
+        ("run --svg a --at x", &["--at = x", "whole number"]),
+        (
+            "run --svg a --at 3 --what fitness",
+            &["--at = 3", "whole run"],
+        ),
+        ("run --svg a --robot 60", &["--robot = 60", "0 to 59"]),
+        ("run --gif a --robot 60", &["--robot = 60", "0 to 59"]),
+        ("run --svg a --what damage", &["--remove", "--reposition"]),
+        (
+            "run --svg a --width-mm 39",
+            &["--width-mm = 39", "40 to 500"],
+        ),
+        (
+            "run --svg a --width-mm 50 --remove 0,0,3,3",
+            &["--width-mm = 50", "words of this picture need", "mm"],
+        ),
+        (
+            "run --svg a --width-mm 40 --what predictions",
+            &["--width-mm = 40", "words of this picture need"],
+        ),
+        ("run --png a --dpi 0", &["--dpi = 0", "50 to 1200"]),
+        (
+            "run --png a --dpi 1200 --width-mm 500",
+            &["23622 x", "too many"],
+        ),
+        ("run --gif a --cell-px 3", &["--cell-px = 3", "4 to 64"]),
+        ("run --gif a --every 61", &["--every = 61", "1 to 60"]),
+        ("run --gif a --fps 0", &["--fps = 0", "1 to 50"]),
+        ("trajectory --svg a --robot 0", &["trajectory", "sense"]),
+        (
+            "trajectory --gif a --colour surprise",
+            &["trajectory", "sense"],
+        ),
+        (
+            "trajectory --svg a --what predictions",
+            &["trajectory", "predict"],
+        ),
+        (
+            "run/best.genome --svg a --what fitness",
+            &["only a run directory"],
+        ),
+    ];
+    for (line, words_of_it) in cases {
+        let run = evolver.run(&words(&format!("replay {line}")));
+        assert_refused(&run, words_of_it);
+        assert!(!evolver.folder().join("a").exists(), "{line}");
+    }
+    // Flags of pictures without a picture.
+    for flag in ["--at 3", "--every 2", "--what state", "--dpi 200"] {
+        let run = evolver.run(&words(&format!("replay run {flag}")));
+        assert_eq!(run.code, Some(2), "{run:?}");
+    }
+    let run = evolver.run(&words("replay run --svg no/such/folder/a.svg"));
+    assert_refused(&run, &["no/such/folder/a.svg", "No such file"]);
+}
+
+#[test]
+fn a_run_directory_that_is_not_whole_is_refused() {
+    let evolver = with_a_run();
+    let refused = |file: &str, change: &dyn Fn(&str) -> Option<String>, words_of_it: &[&str]| {
+        let path = evolver.folder().join("run").join(file);
+        let good = fs::read(&path).unwrap();
+        match change(&String::from_utf8_lossy(&good)) {
+            Some(text) => fs::write(&path, text).unwrap(),
+            None => fs::remove_file(&path).unwrap(),
+        }
+        let run = evolver.run(&words("replay run --svg a.svg"));
+        assert_refused(&run, words_of_it);
+        fs::write(&path, good).unwrap();
+    };
+    for file in [
+        "DONE",
+        "config.toml",
+        "best.genome",
+        "final.json",
+        "generations.csv",
+    ] {
+        refused(file, &|_| None, &["run", "no complete run", file]);
+    }
+    let half = |text: &str| Some(text.chars().take(text.chars().count() / 2).collect());
+    refused("final.json", &half, &["run/final.json", "line"]);
+    refused("best.genome", &half, &["run/best.genome"]);
+    refused("generations.csv", &half, &["generations.csv"]);
+    let other = |text: &str| Some(text.replace("\"schema_version\": 1", "\"schema_version\": 9"));
+    refused(
+        "final.json",
+        &other,
+        &["run/final.json", "schema version 9"],
+    );
+    let still = |text: &str| Some(text.replace("steps = 60", "steps = 0"));
+    refused("config.toml", &still, &["config.toml", "steps", "0"]);
+    replay(&evolver, "run --svg a.svg");
+}
+
+#[test]
+fn a_trajectory_of_one_state_is_nothing_to_replay() {
+    let evolver = with_a_run();
+    let exported = evolver.run(&words("export run --format trajectory --out trajectory"));
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+    let text = evolver.text("trajectory");
+    let shown: String = text
+        .lines()
+        .take(3 + 60)
+        .map(|line| format!("{line}\n"))
+        .collect();
+    evolver.write("one-state", shown.as_bytes());
+    let run = evolver.run(&words("replay one-state --svg a.svg"));
+    assert_refused(&run, &["one-state", "nothing to replay"]);
+}
