@@ -6,6 +6,7 @@ use super::evaluate::flag;
 use super::{BadInput, read_genome};
 use crate::files;
 use crate::finished_run::FinishedRun;
+use crate::replay::page::page;
 use crate::replay::recording::{Origin, Recording};
 use crate::replay::scene::Colouring;
 use clap::Args;
@@ -36,6 +37,12 @@ pub struct ReplayArgs {
     /// What the colours of robots say.
     #[arg(long, value_enum, default_value_t)]
     colour: Colouring,
+    /// Write one page for a browser, which needs nothing else.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Replace a file that exists.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 /// Shows a run.
@@ -43,6 +50,9 @@ pub struct ReplayArgs {
 /// # Errors
 /// [`BadInput`] if there is nothing to look at, or a flag does not fit.
 pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
+    if let Some(file) = &arguments.html {
+        refuse_existing("html", file, arguments.overwrite)?;
+    }
     let recording = recording(arguments)?;
     if recording.steps() == 0 {
         return Err(BadInput::new(format!(
@@ -51,7 +61,23 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
         ))
         .into());
     }
-    let _ = (recording, arguments.colour);
+    if let Some(file) = &arguments.html {
+        let page = page(&recording, arguments.colour)
+            .map_err(|error| BadInput::new(format!("{}: {error}", arguments.run.display())))?;
+        files::replace(file, page.as_bytes()).map_err(BadInput::new)?;
+        show_line!("{} ({} KB)", file.display(), page.len().div_ceil(1000));
+    }
+    Ok(())
+}
+
+/// Refuses to write where there is something.
+pub(super) fn refuse_existing(flag: &str, path: &Path, overwrite: bool) -> Result<(), BadInput> {
+    if !overwrite && path.symlink_metadata().is_ok() {
+        return Err(BadInput::new(format!(
+            "--{flag} = {}: it exists; name another, or replace it with --overwrite",
+            path.display()
+        )));
+    }
     Ok(())
 }
 
