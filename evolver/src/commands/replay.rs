@@ -62,7 +62,7 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
         .into());
     }
     if let Some(file) = &arguments.html {
-        let page = page(&recording, arguments.colour)
+        let page = page(&recording, arguments.colour, None)
             .map_err(|error| BadInput::new(format!("{}: {error}", arguments.run.display())))?;
         files::replace(file, page.as_bytes()).map_err(BadInput::new)?;
         show_line!("{} ({} KB)", file.display(), page.len().div_ceil(1000));

@@ -44,11 +44,15 @@ pub enum PageError {
     },
 }
 
-/// The page.
+/// The page. In a gallery, it links to the gallery's first page.
 ///
 /// # Errors
 /// [`PageError`] if there is too much to show.
-pub fn page(recording: &Recording, colouring: scene::Colouring) -> Result<String, PageError> {
+pub fn page(
+    recording: &Recording,
+    colouring: scene::Colouring,
+    gallery: Option<&str>,
+) -> Result<String, PageError> {
     let (robots, steps) = (recording.robots(), recording.steps());
     if robots as u64 * steps as u64 > ROBOT_STEPS_MAX {
         return Err(PageError::TooLong { robots, steps });
@@ -61,6 +65,7 @@ pub fn page(recording: &Recording, colouring: scene::Colouring) -> Result<String
     let mut about = about(recording);
     about["layout"] = json!(layout);
     about["colouring"] = json!(colouring);
+    about["gallery"] = json!(gallery);
     Ok(Document {
         title: &title(recording),
         style: include_str!("page.css"),

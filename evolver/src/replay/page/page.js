@@ -1,6 +1,5 @@
 const { layout, width, height } = about;
 const { robots: R, steps: T, block: BLOCK } = layout;
-const opening = performance.now();
 
 /* ---- The recording ---- */
 
@@ -566,6 +565,10 @@ function addCurve(name, values, top, shown, ink, states = true) {
 
 function makeWords() {
   document.title = about.title;
+  if (about.gallery) {
+    element('gallery').href = about.gallery;
+    element('up').hidden = false;
+  }
   element('title').textContent = about.title;
   const facts = [];
   if (structure) facts.push(`${percent(recording.members[T] / R)} of ${R} robots`);
@@ -711,8 +714,9 @@ function layOut(again = false) {
   const size = [element('stage').clientWidth, window.innerHeight, window.devicePixelRatio].join();
   if (again !== true && size === laidOut) return;
   laidOut = size;
-  const room = Math.max(240, window.innerHeight - 250);
-  side = fitCanvas(swarm, width, height, element('stage').clientWidth, Math.max(room, 300));
+  // As large as leaves the controls in sight.
+  const room = Math.max(300, window.innerHeight - element('frame').offsetTop - 160);
+  side = fitCanvas(swarm, width, height, element('stage').clientWidth, room);
   ground = document.createElement('canvas');
   [ground.width, ground.height] = [swarm.width, swarm.height];
   drawCells(ground.getContext('2d'), width, height, side);
@@ -808,7 +812,7 @@ async function open() {
   readAddress();
   onTheme(element('theme'), () => layOut(true));
   draw();
-  state.opened = performance.now() - opening;
+  state.opened = performance.now();
   // The check is not waited for.
   setTimeout(() => checkSteps().catch((error) => {
     check.status = 'failed';
