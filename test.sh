@@ -1,7 +1,7 @@
 #!/bin/sh
 # Passes every test: ./test.sh, or ./test.sh --all with those that take longer.
 #
-# Provides what it needs (a C linker, the thumbv7em targets, QEMU, rustfmt and clippy), saying what
+# Provides what it needs (a C linker, the thumbv7em targets, QEMU, Chromium, rustfmt and clippy), saying what
 # it installs. Needs Rust and, where one of these is missing, Debian's apt-get as root or by sudo.
 set -eu
 cd "$(dirname "$0")"
@@ -47,6 +47,7 @@ say 'tools'
 command -v cc >/dev/null || scripts/apt-install.sh gcc libc6-dev
 command -v qemu-system-arm >/dev/null || scripts/apt-install.sh qemu-system-arm
 command -v parallel >/dev/null || scripts/apt-install.sh parallel
+command -v chromium >/dev/null || scripts/apt-install.sh chromium
 qemu-system-arm --version | head -n 1
 export PROVIDE_TOOLS=1
 targets='thumbv7em-none-eabihf thumbv7em-none-eabi'

@@ -21,7 +21,7 @@
 //! |---|---|---|
 //! | move: bit 0 action, bit 1 turn, bit 2 whether it moved | steps | robots have minds |
 //! | prediction, low byte; high byte | states | robots have minds; more than 8 sensors |
-//! | noise, low byte; high byte | steps | any sensor was flipped; more than 8 sensors |
+//! | noise, low byte; high byte | steps | any bit was flipped; any of the high byte |
 //! | x low, x high, y low, y high, heading | states | robots have no minds |
 //! | structures | states | |
 
@@ -50,10 +50,11 @@ pub struct Layout {
     pub block: usize,
     /// Whether anything is known but poses.
     pub minds: bool,
-    /// Whether predictions and noise take two bytes.
-    pub wide: bool,
-    /// Whether any sensor was flipped.
-    pub noise: bool,
+    /// Bytes of a prediction.
+    pub prediction_bytes: usize,
+    /// Bytes of the noise of a reading: none without noise; noise flips bits beyond the sensors
+    /// too, and the hash of the steps covers them.
+    pub noise_bytes: usize,
 }
 
 /// The layout, and the text.
@@ -65,8 +66,10 @@ pub fn encode(recording: &Recording) -> (Layout, String) {
         steps: recording.steps(),
         block: BLOCK,
         minds: recording.minds.is_some(),
-        wide: sensors(recording) > 8,
-        noise: flipped.iter().flatten().any(|&bits| bits != 0),
+        prediction_bytes: sensors(recording).div_ceil(8),
+        noise_bytes: flipped.iter().flatten().fold(0, |bytes, &bits| {
+            bytes.max(usize::from(bits > 0) + usize::from(bits > 0xff))
+        }),
     };
     let mut bytes = Vec::new();
     let starts = recording.poses(0);
@@ -177,17 +180,15 @@ fn block(recording: &Recording, layout: Layout, flipped: &[Vec<u16>], first: usi
             bits.map_or([0; 2], |bits| bits.bits().to_le_bytes())
         };
         let noise = |t: usize, robot: usize| flipped[t][robot].to_le_bytes();
-        for byte in 0..=usize::from(layout.wide) {
+        for byte in 0..layout.prediction_bytes {
             bytes.extend(per_state(layout, first, steps, |t, robot| {
                 predicted(t, robot)[byte]
             }));
         }
-        for byte in 0..=usize::from(layout.wide) {
-            if layout.noise {
-                bytes.extend(per_step(layout, first, steps, |t, robot| {
-                    noise(t, robot)[byte]
-                }));
-            }
+        for byte in 0..layout.noise_bytes {
+            bytes.extend(per_step(layout, first, steps, |t, robot| {
+                noise(t, robot)[byte]
+            }));
         }
     } else {
         for part in 0..5 {

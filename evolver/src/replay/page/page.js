@@ -20,12 +20,11 @@ class Recording {
     this.members = numbers(Uint32Array, T + 1);
     this.starts = starts;
     this.offsets = [];
-    const bytesOfPrediction = layout.wide ? 2 : 1;
     for (let first = 0; first < T; first += BLOCK) {
       this.offsets.push(at);
       const n = Math.min(BLOCK, T - first);
-      const ofSteps = layout.minds ? 1 + (layout.noise ? bytesOfPrediction : 0) : 0;
-      const ofStates = layout.minds ? bytesOfPrediction + 1 : 6;
+      const ofSteps = layout.minds ? 1 + layout.noise_bytes : 0;
+      const ofStates = layout.minds ? layout.prediction_bytes + 1 : 6;
       at += R * (n * ofSteps + (n + 1) * ofStates);
     }
     if (at !== bytes.length) throw new Error('the page is damaged: its data have another length');
@@ -80,7 +79,7 @@ class Recording {
       headings: new Uint8Array(states),
       members: new Uint8Array(states),
       predicted: layout.minds ? new Uint16Array(states) : null,
-      noise: layout.noise ? new Uint16Array(n * R) : null,
+      noise: layout.noise_bytes ? new Uint16Array(n * R) : null,
       moves: layout.minds ? new Uint8Array(n * R) : null,
     };
     const bytes = this.bytes;
@@ -114,12 +113,8 @@ class Recording {
           }
         }
       }
-      plane(decoded.predicted, n + 1, 0, true);
-      if (layout.wide) plane(decoded.predicted, n + 1, 8, true);
-      if (layout.noise) {
-        plane(decoded.noise, n, 0, false);
-        if (layout.wide) plane(decoded.noise, n, 8, false);
-      }
+      for (let i = 0; i < layout.prediction_bytes; i++) plane(decoded.predicted, n + 1, 8 * i, true);
+      for (let i = 0; i < layout.noise_bytes; i++) plane(decoded.noise, n, 8 * i, false);
     } else {
       for (const [target, shift] of [[xs, 0], [xs, 8], [ys, 0], [ys, 8], [headings, 0]]) {
         plane(target, n + 1, shift, true);
@@ -147,6 +142,8 @@ class Recording {
     if (this.sensedOf !== t) {
       const { block, from } = this.at(t);
       this.readings = this.board.sense(block, from, this.readings);
+      // Noise flips bits beyond the sensors too, which only the hash covers.
+      for (let robot = 0; robot < R; robot++) this.readings[robot] &= (1 << about.sensors) - 1;
       this.sensedOf = t;
     }
     return this.readings;
@@ -639,6 +636,8 @@ function showBefore() {
 
 function seek(t) {
   state.t = Math.max(0, Math.min(T, t));
+  // At once: its own keys count from here.
+  element('seek').value = state.t;
   elapsed = 0;
   redraw();
 }
