@@ -277,7 +277,9 @@ async function checkSteps() {
       hash = await digest(step);
       check.done++;
       if (performance.now() - rested > 8) {
-        if (T > 2000) text.textContent = `Checking the steps: ${Math.floor((100 * check.done) / T)} %`;
+        // Readers that speak are told ten times at most.
+        const words = `Checking the steps: ${10 * Math.floor((10 * check.done) / T)} %`;
+        if (T > 2000 && text.textContent !== words) text.textContent = words;
         await new Promise((resume) => setTimeout(resume));
         rested = performance.now();
       }
