@@ -1,8 +1,8 @@
 //! A replay as one page that needs nothing else: it works from a file, without a network, by mouse
 //! and by keyboard, and checks the states that it shows.
 //!
-//! What the page shows and how it is drawn is told by Rust in JSON; the states are
-//! packed by [`encoding`]. The script follows the rules of [`super::scene`].
+//! What the page shows and how it is drawn is told by Rust in JSON; the states are packed by
+//! [`encoding`]. The script follows the rules of [`super::scene`].
 
 pub mod encoding;
 pub mod html;

@@ -434,7 +434,7 @@ function makeViews() {
     const caption = document.createElement('figcaption');
     caption.textContent = words;
     figure.append(caption);
-    element('views').append(figure);
+    element('views').lastElementChild.before(figure);
     views[name] = { picture, spots };
   }
 }
