@@ -1,9 +1,9 @@
 #!/bin/sh
 # Passes every test: ./test.sh, or ./test.sh --all with those that take longer.
 #
-# Provides what it needs (a C linker, the thumbv7em targets, QEMU, GNU parallel, rustfmt and clippy;
-# for --all also Slurm), saying what it installs. Needs Rust and, where one of these is missing,
-# Debian's apt-get as root or by sudo.
+# Provides what it needs (a C linker, the thumbv7em targets, QEMU, Chromium, GNU parallel, rustfmt
+# and clippy; for --all also Slurm), saying what it installs. Needs Rust and, where one of these is
+# missing, Debian's apt-get as root or by sudo.
 set -eu
 cd "$(dirname "$0")"
 
@@ -48,6 +48,7 @@ say 'tools'
 command -v cc >/dev/null || scripts/apt-install.sh gcc libc6-dev
 command -v qemu-system-arm >/dev/null || scripts/apt-install.sh qemu-system-arm
 command -v parallel >/dev/null || scripts/apt-install.sh parallel
+command -v chromium >/dev/null || scripts/apt-install.sh chromium
 without_slurm=
 if [ -n "${TEST_ALL:-}" ]; then
     if [ "$(id -u)" = 0 ] && getent hosts "$(hostname -s)" >/dev/null && { { command -v slurmctld && command -v slurmd && command -v sbatch &&

@@ -8,6 +8,7 @@ use crate::commands::evaluate::{EvaluateArgs, evaluate};
 use crate::commands::evolve::{EvolveArgs, evolve};
 use crate::commands::export::{ExportArgs, export};
 use crate::commands::flash::{FlashArgs, flash};
+use crate::commands::gallery::{GalleryArgs, gallery};
 use crate::commands::hil::{HilArgs, hil};
 use crate::commands::import::{ImportArgs, import};
 use crate::commands::inspect::inspect;
@@ -52,6 +53,8 @@ enum Command {
     },
     /// Look at a run: in the terminal, or as a page or pictures.
     Replay(Box<ReplayArgs>),
+    /// Write a page with the final state of every run, from which the replay of each opens.
+    Gallery(GalleryArgs),
     /// Evaluate a genome from new starts, on other grids, with other noise and swarm sizes.
     Evaluate(EvaluateArgs),
     /// Take a part of what a swarm formed away, or scatter it, and see what the swarm does.
@@ -97,6 +100,7 @@ pub fn main() -> ExitCode {
         Some(Command::Bench { json }) => bench(json).map(done),
         Some(Command::Classify { state, json }) => classify(&state, json).map(done),
         Some(Command::Replay(arguments)) => replay(&arguments).map(done),
+        Some(Command::Gallery(arguments)) => gallery(&arguments).map(done),
         Some(Command::Evaluate(arguments)) => evaluate(&arguments).map(done),
         Some(Command::Damage(arguments)) => damage(&arguments).map(done),
         Some(Command::Export(arguments)) => export(&arguments).map(done),

@@ -1,5 +1,6 @@
 //! What the integration tests share.
 
+pub mod browser;
 pub mod firmware;
 pub mod flash;
 pub mod full;

@@ -8,6 +8,7 @@ pub mod evaluate;
 pub mod evolve;
 pub mod export;
 pub mod flash;
+pub mod gallery;
 pub mod hil;
 pub mod import;
 pub mod inspect;

@@ -2,6 +2,7 @@
 
 use super::BadInput;
 use super::evaluate::flag;
+use super::replay::refuse_existing;
 use crate::files;
 use crate::replay::palette::{DARK, LIGHT, Theme};
 use crate::replay::pictures::film::Film;
@@ -131,16 +132,10 @@ impl PictureArgs {
     ///
     /// # Errors
     /// [`BadInput`] names the flag and the file.
-    pub(super) fn refuse_existing(&self) -> Result<(), BadInput> {
-        for (flag, file) in self.files() {
-            if let Some(file) = file.filter(|file| file.symlink_metadata().is_ok()) {
-                return Err(BadInput::new(format!(
-                    "--{flag} = {}: it exists, and nothing is overwritten; name another",
-                    file.display()
-                )));
-            }
-        }
-        Ok(())
+    pub(super) fn refuse_existing(&self, overwrite: bool) -> Result<(), BadInput> {
+        let files = self.files().into_iter();
+        let mut given = files.filter_map(|(flag, file)| Some((flag, file?)));
+        given.try_for_each(|(flag, file)| refuse_existing(flag, file, overwrite))
     }
 
     /// Writes the pictures.

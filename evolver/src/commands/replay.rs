@@ -7,6 +7,7 @@ use super::pictures::PictureArgs;
 use super::{BadInput, read_genome};
 use crate::files;
 use crate::finished_run::FinishedRun;
+use crate::replay::page::page;
 use crate::replay::recording::{Origin, Recording};
 use crate::replay::scene::Colouring;
 use crate::replay::terminal::{self, PlayError};
@@ -56,6 +57,12 @@ pub struct ReplayArgs {
     colour: Colouring,
     #[command(flatten)]
     pictures: PictureArgs,
+    /// Write one page for a browser, which needs nothing else.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Replace a file that exists.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 /// Shows a run.
@@ -63,7 +70,11 @@ pub struct ReplayArgs {
 /// # Errors
 /// [`BadInput`] if there is nothing to look at, or a flag does not fit.
 pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
-    arguments.pictures.refuse_existing()?;
+    let overwrite = arguments.overwrite;
+    if let Some(file) = &arguments.html {
+        refuse_existing("html", file, overwrite)?;
+    }
+    arguments.pictures.refuse_existing(overwrite)?;
     let recording = recording(arguments)?;
     if recording.steps() == 0 {
         return Err(BadInput::new(format!(
@@ -72,11 +83,19 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
         ))
         .into());
     }
-    if arguments.pictures.is_any() {
-        return arguments.pictures.write(&recording, arguments.colour);
+    if let Some(file) = &arguments.html {
+        let page = page(&recording, arguments.colour, None)
+            .map_err(|error| BadInput::new(format!("{}: {error}", arguments.run.display())))?;
+        files::replace(file, page.as_bytes()).map_err(BadInput::new)?;
+        show_line!("{} ({} KB)", file.display(), page.len().div_ceil(1000));
     }
-    let stop = stop_on_signal()?;
-    in_terminal(&recording, arguments.colour, &stop)
+    if arguments.pictures.is_any() {
+        arguments.pictures.write(&recording, arguments.colour)?;
+    } else if arguments.html.is_none() {
+        let stop = stop_on_signal()?;
+        in_terminal(&recording, arguments.colour, &stop)?;
+    }
+    Ok(())
 }
 
 /// Plays a recording in the terminal until the user, or `stop`, ends it.
@@ -103,6 +122,17 @@ fn stop_on_signal() -> Result<Arc<AtomicBool>, ctrlc::Error> {
     let asked = Arc::clone(&stop);
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
     Ok(stop)
+}
+
+/// Refuses to write where there is something.
+pub(super) fn refuse_existing(flag: &str, path: &Path, overwrite: bool) -> Result<(), BadInput> {
+    if !overwrite && path.symlink_metadata().is_ok() {
+        return Err(BadInput::new(format!(
+            "--{flag} = {}: it exists; name another, or replace it with --overwrite",
+            path.display()
+        )));
+    }
+    Ok(())
 }
 
 fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {

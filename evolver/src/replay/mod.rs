@@ -3,6 +3,8 @@
 //! [`recording`] is what there is to see, made of the files that a run leaves behind; [`scene`] is
 //! one state of it to draw, in the colours of [`palette`]; everything else here draws scenes.
 
+pub mod gallery;
+pub mod page;
 pub mod palette;
 pub mod pictures;
 pub mod recording;

@@ -233,7 +233,10 @@ impl Recording {
     /// What a robot sensed in step `t`, noise included; none in the last state and of a trajectory.
     #[must_use]
     pub fn sensed(&self, t: usize, robot: usize) -> Option<SensorBits> {
-        self.trace.steps.get(t)?.readings.get(robot).copied()
+        let reading = self.trace.steps.get(t)?.readings.get(robot)?;
+        // Noise flips bits beyond the model's sensors too, which nobody looks at.
+        let sensors = self.minds.as_ref()?.topology.model().mask();
+        Some(SensorBits::new(reading.bits() & sensors.bits()))
     }
 
     /// What a robot expects to sense in state `t`; none of a trajectory.

@@ -1,0 +1,55 @@
+//! `evolver gallery`: all runs at a glance, each a step from its replay.
+
+use super::evaluate::flag;
+use super::{BadInput, thread_pool};
+use crate::replay::gallery::{Existing, write};
+use crate::settings::count;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Which runs, and where to.
+#[derive(Debug, Args)]
+pub struct GalleryArgs {
+    /// Run directories, or directories that hold run directories.
+    #[arg(required = true, value_name = "DIR")]
+    directories: Vec<PathBuf>,
+    /// The folder for index.html and a page a run.
+    #[arg(long, value_name = "FOLDER", default_value = "gallery")]
+    out: PathBuf,
+    /// Replace the pages of a folder that exists.
+    #[arg(long)]
+    overwrite: bool,
+    /// Threads [default: one a core]; the pages do not depend on them.
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    threads: Option<String>,
+}
+
+/// Writes a gallery.
+///
+/// # Errors
+/// [`BadInput`] if there is nothing to show, or no place for it.
+pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<()> {
+    let threads = match &arguments.threads {
+        Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
+        None => None,
+    };
+    let existing = if arguments.overwrite {
+        Existing::Overwrite
+    } else {
+        Existing::Refuse
+    };
+    let written = thread_pool(threads)?
+        .install(|| write(&arguments.directories, &arguments.out, existing))
+        .map_err(BadInput::new)?;
+    let left_out = match written.unfinished {
+        0 => String::new(),
+        n => format!("; {n} that have not ended left out"),
+    };
+    show_line!(
+        "{} ({} runs, {:.1} MB{left_out})",
+        written.index.display(),
+        written.runs,
+        written.bytes as f64 / 1e6
+    );
+    Ok(())
+}

@@ -1,0 +1,304 @@
+//! A gallery: one page with the final state of every run, from which the replay of each opens.
+//!
+//! It is a folder of pages, `index.html` and one a run, so that it opens at once however many runs
+//! there are.
+
+use super::page::html::Document;
+use super::page::{self, PageError, encoding, prediction_name};
+use super::palette;
+use super::recording::Recording;
+use super::scene::{Colouring, Ink, Scene};
+use crate::files::{self, FileError};
+use crate::finished_run::{FinishedRun, ReadRunError};
+use crate::settings::model_name;
+use minimal_surprise_sim::Structure;
+use rayon::prelude::*;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The first page of a gallery.
+pub const INDEX: &str = "index.html";
+/// How many folders deep runs are looked for.
+const DEPTH: usize = 3;
+
+/// A gallery cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum GalleryError {
+    /// A run cannot be read.
+    #[error(transparent)]
+    Run(#[from] ReadRunError),
+    /// A run cannot be shown.
+    #[error("{}: {error}", path.display())]
+    Page {
+        /// The run directory.
+        path: PathBuf,
+        /// Why.
+        error: PageError,
+    },
+    /// A run cannot be run again.
+    #[error("{}: {error}", path.display())]
+    World {
+        /// The run directory.
+        path: PathBuf,
+        /// Why.
+        error: minimal_surprise_sim::WorldError,
+    },
+    /// There is nothing to show.
+    #[error("no complete run in {}", list(.0))]
+    Empty(Vec<PathBuf>),
+    /// There is something already.
+    #[error("{} exists; name another folder, or replace its pages with --overwrite", .0.display())]
+    Exists(PathBuf),
+    /// A file or folder cannot be used.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+/// A gallery that has been written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// Its first page.
+    pub index: PathBuf,
+    /// Runs in it.
+    pub runs: usize,
+    /// Run directories left out because their runs have not ended.
+    pub unfinished: usize,
+    /// Size of all its pages.
+    pub bytes: u64,
+}
+
+/// Whether pages of an earlier gallery may be replaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Existing {
+    /// Nothing is written where there is something.
+    Refuse,
+    /// Pages are replaced one by one; other files stay.
+    Overwrite,
+}
+
+/// Writes the gallery of all runs in some directories: run directories, or directories that hold
+/// run directories.
+///
+/// # Errors
+/// [`GalleryError`]; a new folder is then not there.
+pub fn write(
+    directories: &[PathBuf],
+    out: &Path,
+    existing: Existing,
+) -> Result<Written, GalleryError> {
+    let exists = out.symlink_metadata().is_ok();
+    if exists && existing == Existing::Refuse {
+        return Err(GalleryError::Exists(out.to_owned()));
+    }
+    let found = Found::in_all(directories)?;
+    if found.runs.is_empty() {
+        return Err(GalleryError::Empty(directories.to_vec()));
+    }
+    if exists {
+        let bytes = found.write(out)?;
+        return Ok(found.written(out, bytes));
+    }
+    // A new gallery is there as a whole or not at all.
+    let name = out.file_name().unwrap_or_default().to_string_lossy();
+    let beside = out.with_file_name(format!(".{name}.part"));
+    let write = || {
+        if beside.exists() {
+            fs::remove_dir_all(&beside).map_err(FileError::at(&beside))?;
+        }
+        fs::create_dir_all(&beside).map_err(FileError::at(&beside))?;
+        let bytes = found.write(&beside)?;
+        fs::rename(&beside, out).map_err(FileError::at(out))?;
+        Ok(found.written(out, bytes))
+    };
+    write().inspect_err(|_| {
+        // The half-written folder is of no use; that it cannot be removed changes nothing.
+        let _ = fs::remove_dir_all(&beside);
+    })
+}
+
+/// Run directories.
+#[derive(Debug, Default)]
+struct Found {
+    /// With the names of their pages.
+    runs: Vec<(PathBuf, String)>,
+    unfinished: usize,
+    seen: BTreeSet<PathBuf>,
+    names: BTreeSet<String>,
+}
+
+impl Found {
+    fn in_all(directories: &[PathBuf]) -> Result<Self, GalleryError> {
+        let mut found = Self::default();
+        found.names.insert(INDEX.to_owned());
+        for directory in directories {
+            if is_run(directory) {
+                found.add(directory)?;
+            } else {
+                found.look_in(directory, DEPTH)?;
+            }
+        }
+        Ok(found)
+    }
+
+    fn look_in(&mut self, directory: &Path, depth: usize) -> Result<(), GalleryError> {
+        let at = || FileError::at(directory);
+        let mut inside = Vec::new();
+        for entry in fs::read_dir(directory).map_err(at())? {
+            inside.push(entry.map_err(at())?.path());
+        }
+        inside.sort();
+        for path in inside.iter().filter(|path| path.is_dir()) {
+            if path.join("DONE").is_file() {
+                self.add(path)?;
+            } else if is_run(path) {
+                self.unfinished += 1;
+            } else if depth > 1 {
+                self.look_in(path, depth - 1)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, run: &Path) -> Result<(), GalleryError> {
+        let whole = run.canonicalize().map_err(FileError::at(run))?;
+        if self.seen.insert(whole.clone()) {
+            let name = whole.file_name().unwrap_or_default().to_string_lossy();
+            let name = page_name(&name, &self.names);
+            self.names.insert(name.clone());
+            self.runs.push((run.to_owned(), name));
+        }
+        Ok(())
+    }
+
+    /// Writes all pages, the first one last.
+    fn write(&self, folder: &Path) -> Result<u64, GalleryError> {
+        let cards = self.runs.par_iter().map(|(run, name)| {
+            let recording = read(run)?;
+            let text =
+                page::page(&recording, Colouring::Structure, Some(INDEX)).map_err(|error| {
+                    GalleryError::Page {
+                        path: run.clone(),
+                        error,
+                    }
+                })?;
+            files::replace(&folder.join(name), text.as_bytes())?;
+            Ok(Card::of(&recording, name, text.len()))
+        });
+        let cards = cards.collect::<Result<Vec<_>, GalleryError>>()?;
+        let index = index(&cards);
+        files::replace(&folder.join(INDEX), index.as_bytes())?;
+        let pages: usize = cards.iter().map(|card| card.bytes).sum();
+        Ok((pages + index.len()) as u64)
+    }
+
+    fn written(&self, out: &Path, bytes: u64) -> Written {
+        Written {
+            index: out.join(INDEX),
+            runs: self.runs.len(),
+            unfinished: self.unfinished,
+            bytes,
+        }
+    }
+}
+
+/// Whether a directory is that of a run, complete or not.
+fn is_run(path: &Path) -> bool {
+    path.join("DONE").is_file() || path.join("config.toml").is_file()
+}
+
+/// A name of a file that no link has to escape, different from those that are taken.
+fn page_name(run: &str, taken: &BTreeSet<String>) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    let stem: String = run
+        .chars()
+        .map(|c| if plain(c) { c } else { '-' })
+        .collect();
+    let numbered = |number: u32| match number {
+        1 => format!("{stem}.html"),
+        _ => format!("{stem}-{number}.html"),
+    };
+    let free = (1..).map(numbered).find(|name| !taken.contains(name));
+    free.unwrap_or_default()
+}
+
+fn read(run: &Path) -> Result<Recording, GalleryError> {
+    let finished = FinishedRun::read(run)?;
+    let name = run.display().to_string();
+    Recording::of_run(&name, &finished).map_err(|error| GalleryError::World {
+        path: run.to_owned(),
+        error,
+    })
+}
+
+/// A run in the gallery.
+struct Card {
+    about: Value,
+    robots: Vec<u8>,
+    bytes: usize,
+}
+
+impl Card {
+    fn of(recording: &Recording, page: &str, bytes: usize) -> Self {
+        let last = recording.steps();
+        let scene = Scene::of(recording, last, Colouring::Structure, None);
+        let minds = recording.minds.as_ref();
+        let share = recording.in_structure(last) as f64 / recording.robots().max(1) as f64;
+        let about = json!({
+            "page": page,
+            "names": recording.names.iter().map(|name| name.name()).collect::<Vec<_>>(),
+            "share": share,
+            "fitness": minds.and_then(|minds| minds.fitness.last()),
+            "seed": recording.origin.seed.map(|seed| seed.to_string()),
+            "grid": recording.grid.to_string(),
+            "width": scene.width,
+            "height": scene.height,
+            "model": minds.map(|minds| model_name(minds.topology.model()).to_uppercase()),
+            "prediction": minds.map(|minds| prediction_name(minds.topology)),
+            "noise": recording.origin.noise,
+            "robots": recording.robots(),
+        });
+        let xs = scene.robots.iter().flat_map(|robot| robot.x.to_le_bytes());
+        let ys = scene.robots.iter().flat_map(|robot| robot.y.to_le_bytes());
+        let rest = scene.robots.iter().map(|robot| {
+            let ink = match robot.ink {
+                Ink::Named => 1,
+                Ink::Other => 2,
+                Ink::Outside => 3,
+                Ink::Plain | Ink::Surprise(_) => 0,
+            };
+            robot.heading | ink << 2
+        });
+        Self {
+            about,
+            robots: xs.chain(ys).chain(rest).collect(),
+            bytes,
+        }
+    }
+}
+
+fn index(cards: &[Card]) -> String {
+    let about = json!({
+        "arrow": palette::ARROW,
+        "hollow": page::hollow(),
+        "structures": Structure::ALL.map(Structure::name),
+        "inks": ["plain", "named", "other", "outside"],
+        "runs": cards.iter().map(|card| &card.about).collect::<Vec<_>>(),
+    });
+    let robots: Vec<Vec<u8>> = cards.iter().map(|card| card.robots.clone()).collect();
+    Document {
+        title: "Gallery",
+        style: include_str!("gallery.css"),
+        body: include_str!("gallery.html"),
+        script: include_str!("gallery.js"),
+        about: &about,
+        data: &encoding::packed(&robots),
+    }
+    .to_html()
+}
+
+fn list(paths: &[PathBuf]) -> String {
+    let paths: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
+    paths.join(", ")
+}
