@@ -5,6 +5,7 @@ use super::evolve::stop_on_ctrl_c;
 use super::{BadInput, thread_pool};
 use crate::files;
 use crate::finished_run::ReadRunError;
+use crate::replay::gallery::{self, Existing};
 use crate::report::progress::ProgressMode;
 use crate::report::suite_progress::{SearchProgress, SuiteProgress};
 use crate::report::summary::shell_word;
@@ -61,6 +62,10 @@ pub enum Verb {
         /// Where it is written [default: report/ in the directory of the suite].
         #[arg(long, value_name = "DIR")]
         to: Option<PathBuf>,
+        /// Also write a page with every run's final state, from which its replay opens: gallery/ in
+        /// the report.
+        #[arg(long)]
+        gallery: bool,
     },
     /// Hand the runs to a cluster.
     Submit {
@@ -224,7 +229,7 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
             print_status(&plan, &directory)?;
             print_searches(&plan, &read.suite, &directory).map_err(BadInput::new)?;
         }
-        Verb::Report { to, .. } => {
+        Verb::Report { to, gallery, .. } => {
             let out = to.clone().unwrap_or_else(|| directory.join("report"));
             if !report::may_be_written(&out) {
                 return Err(BadInput::new(format!(
@@ -233,6 +238,9 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
                     out.display()
                 ))
                 .into());
+            }
+            if *gallery {
+                write_gallery(&plan, &directory, &out.join(report::GALLERY))?;
             }
             let written = report::write(&plan, &read.suite, &directory, &out, &read.called)?;
             show_line!(
@@ -288,6 +296,28 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The gallery of a plan's finished runs; an earlier one is replaced.
+fn write_gallery(plan: &Plan, directory: &Path, out: &Path) -> anyhow::Result<()> {
+    let runs = plan.runs();
+    let done = |run: &&&PlannedRun| progress(run, directory) == Progress::Done;
+    let finished = runs.iter().filter(done);
+    let finished: Vec<PathBuf> = finished.map(|run| run.directory(directory)).collect();
+    if finished.is_empty() {
+        return Ok(());
+    }
+    if let Some(parent) = out.parent() {
+        fs::create_dir_all(parent).map_err(files::FileError::at(parent))?;
+    }
+    let written = gallery::write(&finished, out, Existing::Overwrite)?;
+    show_line!(
+        "{} runs, {:.1} MB; {}",
+        written.runs,
+        written.bytes as f64 / 1e6,
+        written.index.display()
+    );
+    Ok(())
 }
 
 /// The choice of runs as flags, for tasks.

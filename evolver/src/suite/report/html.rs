@@ -36,6 +36,9 @@ pub fn page(report: &Report) -> String {
          <title>{0}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{0}</h1>\n",
         escape(&title)
     );
+    if report.has_gallery {
+        page += "<p><a href=\"gallery/index.html\">Look at every run</a>: its final state and its replay.</p>\n";
+    }
     for (heading, paragraphs) in opening(report) {
         let _ = writeln!(page, "<h2>{}</h2>", escape(heading));
         write_paragraphs(&mut page, &paragraphs);

@@ -67,6 +67,9 @@ pub fn text(report: &Report) -> String {
         let _ = writeln!(text, "\n{}", super::html::SHARED);
     }
     text += "\nEvery run with its seed and hash: [runs.csv](runs.csv).\n";
+    if report.has_gallery {
+        let _ = writeln!(text, "Every run to look at: [gallery](gallery/index.html).");
+    }
     text
 }
 

@@ -134,6 +134,8 @@ pub struct Report {
     pub differences: Vec<String>,
     /// What was looked into where we differ: the lines of a text that lies in the report's folder.
     pub looked_into: Vec<String>,
+    /// Whether a gallery of the runs lies in the report's folder.
+    pub has_gallery: bool,
     /// Whether experiments share runs.
     pub shares_runs: bool,
     /// Tests made in the tables.
@@ -166,6 +168,9 @@ struct RunRow<'a> {
     program: &'a str,
 }
 
+/// Where a report links to, in its directory, if there is a gallery of its runs.
+pub const GALLERY: &str = "gallery";
+
 /// Whether a report would replace nothing but a report: the directory is new or empty, or has one,
 /// or what is to be said in it.
 #[must_use]
@@ -173,8 +178,8 @@ pub fn may_be_written(out: &Path) -> bool {
     match std::fs::read_dir(out) {
         Err(_) => !out.exists(),
         Ok(mut entries) => {
-            let known = ["report.html", LOOKED_INTO];
-            entries.next().is_none() || known.iter().any(|name| out.join(name).is_file())
+            let known = ["report.html", LOOKED_INTO, GALLERY];
+            entries.next().is_none() || known.iter().any(|name| out.join(name).exists())
         }
     }
 }
@@ -195,6 +200,7 @@ pub fn write(
 ) -> Result<Written, ReportError> {
     let gathered = Gathered::read(plan, suite, directory)?;
     let mut report = Report::of(&gathered, &suite.name, called)?;
+    report.has_gallery = out.join(GALLERY).join("index.html").is_file();
     let looked_into = out.join(LOOKED_INTO);
     if looked_into.is_file() {
         let text = files::read(&looked_into)?;
@@ -257,6 +263,7 @@ impl Report {
         Ok(Self {
             suite: suite.to_owned(),
             looked_into: Vec::new(),
+            has_gallery: false,
             shares_runs,
             time,
             missing: missing.collect(),
