@@ -577,6 +577,7 @@ function makeWords() {
   if (about.model) facts.push(`sensor model ${about.model}`, `predictions ${about.prediction}`);
   if (about.noise > 0) facts.push(`noise ${about.noise}`);
   if (about.seed !== null) facts.push(`seed ${about.seed}`);
+  if (about.run_hash) facts.push(`run ${about.run_hash.slice(0, 8)}`);
   if (about.damage) facts.push(about.damage.done === 'remove' ? 'robots removed' : 'robots repositioned');
   element('facts').textContent = facts.join(' · ');
   const hashes = [['run', about.source], ['hash of the run', about.run_hash],
