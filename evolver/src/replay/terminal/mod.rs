@@ -73,17 +73,15 @@ fn watch(
     stop: &AtomicBool,
 ) -> io::Result<()> {
     let mut last = Instant::now();
-    let mut changed = true;
     while !stop.load(Ordering::Relaxed) {
-        if changed {
-            terminal.draw(|frame| screen::draw(frame, player, paints))?;
-        }
+        // Also when nothing has happened: a window that changed before its changes were listened to
+        // is met with the next look. Only cells that differ are written.
+        terminal.draw(|frame| screen::draw(frame, player, paints))?;
         let left = match player.pause() {
             Some(pause) => pause.saturating_sub(last.elapsed()).clamp(A_LOOK, PATIENCE),
             None => PATIENCE,
         };
-        changed = event::poll(left)?;
-        if changed {
+        if event::poll(left)? {
             match event::read()? {
                 Event::Key(key) if player.key(key) => return Ok(()),
                 _ => {}
@@ -94,7 +92,6 @@ fn watch(
             Some(_) => {
                 player.go_on();
                 last = Instant::now();
-                changed = true;
             }
             None => last = Instant::now(),
         }
