@@ -1,5 +1,5 @@
-//! The robot's plug is pulled while a genome is written to it over the line: QEMU is killed, at
-//! chosen flash operations and at random moments. `TEST_ALL=1` kills it more often.
+//! The robot's plug is pulled during `evolver flash`: QEMU is killed, at chosen flash operations and
+//! at random moments. `TEST_ALL=1` kills it more often.
 //!
 //! A failure prints which kill it was; kills depend on [`SEED`] and their number alone, as far as
 //! a host's clock lets them.
@@ -8,7 +8,7 @@ use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, Provenance, encode
 use minimal_surprise_controller::{
     Controller, EncodedGenome, Genome, KERNEL_ID, SensorBits, State, Topology,
 };
-use minimal_surprise_link::{CHUNK_BYTES_MAX, GenomeInUse, Reply, Request};
+use minimal_surprise_link::{GenomeInUse, Reply, Request};
 use minimal_surprise_slots::{COMMIT_AT, CONTAINER_AT, crc_of, slot_bytes};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
@@ -19,7 +19,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 use tests::firmware::{self, Firmware};
 use tests::full::all_cases;
-use tests::robot::{Line, LineError, QemuRobot};
+use tests::program::{Evolver, Finished};
+use tests::robot::{Line, QemuRobot};
 use tests::tools::{Missing, require};
 
 /// Seed of the genomes and of the kills.
@@ -175,50 +176,38 @@ fn container(generation: u32) -> Vec<u8> {
     encode(&genome, provenance, &mut buffer).unwrap().to_vec()
 }
 
-/// A robot that is switched on, and its line.
+/// A robot that is switched on.
 struct Robot {
     qemu: QemuRobot,
-    line: Line,
     /// What it said when it was asked first.
     genome: GenomeInUse,
 }
 
 impl Robot {
-    fn start(firmware: &Firmware, folder: &Path, session: u32) -> Result<Self, Missing> {
+    fn start(firmware: &Firmware, folder: &Path, rng: &mut ChaCha8Rng) -> Result<Self, Missing> {
         let qemu = QemuRobot::start(firmware, folder)?;
-        let mut line = Line::open(&qemu.port, session).unwrap();
-        let identified = line.ask(&Request::Identify, |reply| match reply {
-            Reply::Identity(identity) => {
-                assert_eq!((identity.firmware, identity.kernel), ("robot", KERNEL_ID));
-                assert!(!identity.running);
-                identity.genome
-            }
-            other => panic!("{other:?}"),
-        });
-        Ok(Self {
-            genome: identified.unwrap(),
-            qemu,
-            line,
-        })
+        let (_, genome) = identify(&qemu, rng, false);
+        Ok(Self { qemu, genome })
     }
 
     /// Shows that the genome is the one that decides.
-    fn must_run(&mut self, container: &[u8], rng: &mut ChaCha8Rng) {
+    fn must_run(&self, container: &[u8], running: bool, rng: &mut ChaCha8Rng) {
+        let (mut line, in_use) = identify(&self.qemu, rng, running);
+        assert!(is_in_use(in_use, container), "{in_use:?}");
         let genome = EncodedGenome::decode(container).unwrap();
         let controller = Controller::from_encoded(&genome);
         let mut state = State::new(&controller);
-        self.line
-            .ask(&Request::Reset, |reply| assert_eq!(reply, Reply::Done))
-            .unwrap();
+        for request in [Request::Stop, Request::Reset] {
+            line.ask(&request, |reply| assert_eq!(reply, Reply::Done))
+                .unwrap();
+        }
         for _ in 0..8 {
             let sensors = SensorBits::new(rng.next_u32() as u16);
             let expected = controller.step(&mut state, sensors);
-            let stepped = self
-                .line
-                .ask(&Request::Step { sensors }, |reply| match reply {
-                    Reply::Stepped(stepped) => stepped,
-                    other => panic!("{other:?}"),
-                });
+            let stepped = line.ask(&Request::Step { sensors }, |reply| match reply {
+                Reply::Stepped(stepped) => stepped,
+                other => panic!("{other:?}"),
+            });
             let stepped = stepped.unwrap();
             assert_eq!(
                 (stepped.decision, stepped.surprise),
@@ -228,11 +217,32 @@ impl Robot {
     }
 
     /// Writes a genome and says how long that took.
-    fn update(&mut self, container: &[u8]) -> Duration {
+    fn update(&self, evolver: &Evolver, container: &[u8]) -> Duration {
         let started = Instant::now();
-        self.line.write(container, CHUNK_BYTES_MAX).unwrap();
+        let flashed = flash(evolver, &self.qemu.port, container);
+        assert_eq!(flashed.code, Some(0), "{flashed:?}");
         started.elapsed()
     }
+}
+
+/// A session of the line of a robot, and the genome in use.
+fn identify(qemu: &QemuRobot, rng: &mut ChaCha8Rng, running: bool) -> (Line, GenomeInUse) {
+    let mut line = Line::open(&qemu.port, rng.next_u32()).unwrap();
+    let identified = line.ask(&Request::Identify, |reply| match reply {
+        Reply::Identity(identity) => {
+            assert_eq!((identity.firmware, identity.kernel), ("robot", KERNEL_ID));
+            assert_eq!(identity.running, running);
+            identity.genome
+        }
+        other => panic!("{other:?}"),
+    });
+    (line, identified.unwrap())
+}
+
+/// `evolver flash`, to its end.
+fn flash(evolver: &Evolver, port: &str, container: &[u8]) -> Finished {
+    evolver.write("new.genome", container);
+    evolver.run(&["flash", "new.genome", "--port", port])
 }
 
 /// Which of its slots a robot writes next, as a place in the file.
@@ -241,6 +251,12 @@ fn slot_to_write(genome: GenomeInUse) -> u64 {
         GenomeInUse::Slot { slot: 0, .. } => slot_bytes(ERASE_BYTES) as u64,
         GenomeInUse::Slot { .. } | GenomeInUse::BuiltIn => 0,
     }
+}
+
+/// How many errors a program has said.
+fn said(finished: &Finished) -> usize {
+    let lines = finished.stderr.lines();
+    lines.filter(|line| line.starts_with("error: ")).count()
 }
 
 /// Whether the genome in use is this one.
@@ -255,15 +271,16 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
     };
     let kills = if all_cases() { KILLS_ALL } else { KILLS };
     let folder = tempfile::tempdir().unwrap();
-    let Some(mut robot) = require(Robot::start(&firmware, folder.path(), 0)) else {
+    let evolver = Evolver::in_empty_folder();
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let Some(mut robot) = require(Robot::start(&firmware, folder.path(), &mut rng)) else {
         return;
     };
     assert_eq!(robot.genome, GenomeInUse::BuiltIn);
-    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let mut old = container(0);
     // Both slots have been in use before the first kill: there is something to erase.
-    robot.update(&container(u32::MAX));
-    let mut update_time = robot.update(&old);
+    robot.update(&evolver, &container(u32::MAX));
+    let mut update_time = robot.update(&evolver, &old);
     let mut slot = slot_bytes(ERASE_BYTES) as u64;
 
     let (mut olds, mut news, mut unheard) = (0, 0, 0);
@@ -274,24 +291,27 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
         let _failing = Failing(index, kill);
         slot = slot_bytes(ERASE_BYTES) as u64 - slot;
         let slot_bytes = SlotBytes::open(folder.path(), slot);
-        let Robot { qemu, mut line, .. } = robot;
-        let written = thread::scope(|scope| {
-            let writer = scope.spawn(|| line.write(&new, CHUNK_BYTES_MAX));
+        let Robot { qemu, .. } = robot;
+        let port = qemu.port.clone();
+        let flashed = thread::scope(|scope| {
+            let writer = scope.spawn(|| flash(&evolver, &port, &new));
             kill.wait(&slot_bytes, update_time);
             qemu.kill();
             writer.join().unwrap()
         });
 
-        robot = Robot::start(&firmware, folder.path(), index + 1).unwrap();
+        robot = Robot::start(&firmware, folder.path(), &mut rng).unwrap();
         let runs_new = is_in_use(robot.genome, &new);
         let runs_old = is_in_use(robot.genome, &old);
         assert!(runs_new || runs_old, "{:?}", robot.genome);
-        robot.must_run(if runs_new { &new } else { &old }, &mut rng);
-        match written {
-            Ok(_) => assert!(runs_new, "acknowledged, and gone"),
-            Err(LineError::Port(_)) if runs_new => unheard += 1,
-            Err(LineError::Port(_)) => {}
-            Err(error) => panic!("{error:?}"),
+        robot.must_run(if runs_new { &new } else { &old }, false, &mut rng);
+        match flashed.code {
+            Some(0) => assert!(runs_new, "acknowledged, and gone"),
+            Some(2) => {
+                assert_eq!(said(&flashed), 1, "one clear message: {flashed:?}");
+                unheard += u32::from(runs_new);
+            }
+            _ => panic!("{flashed:?}"),
         }
         if runs_new {
             news += 1;
@@ -300,8 +320,8 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
         }
 
         slot = slot_to_write(robot.genome);
-        update_time = robot.update(&new);
-        robot.must_run(&new, &mut rng);
+        update_time = robot.update(&evolver, &new);
+        robot.must_run(&new, true, &mut rng);
         old = new;
     }
     println!(

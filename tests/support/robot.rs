@@ -3,8 +3,8 @@
 use crate::firmware::{Firmware, QEMU, no_qemu};
 use crate::tools::Missing;
 use minimal_surprise_link::{Client, GaveUp, Reply, Request};
-use minimal_surprise_slots::crc_of;
 use serialport::SerialPort;
+use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -21,6 +21,8 @@ pub struct QemuRobot {
     child: Child,
     /// Its serial port.
     pub port: String,
+    /// The port, open: QEMU looks only once a second whether one that was closed is open again.
+    _open: File,
 }
 
 impl QemuRobot {
@@ -58,7 +60,12 @@ impl QemuRobot {
         let port = port.to_owned();
         // A full pipe would stop the robot at its next log line.
         thread::spawn(move || io::copy(&mut output, &mut io::sink()));
-        Ok(Self { child, port })
+        let open = OpenOptions::new().read(true).write(true).open(&port);
+        Ok(Self {
+            child,
+            _open: open.expect("QEMU has just made it"),
+            port,
+        })
     }
 
     /// Pulls its plug: SIGKILL.
@@ -150,29 +157,5 @@ impl Line {
                 overdue = Instant::now() + wait;
             }
         }
-    }
-
-    /// Writes a genome to a robot that stands, in an open session. Says the write count.
-    ///
-    /// # Errors
-    /// [`LineError`].
-    ///
-    /// # Panics
-    /// If the robot refuses.
-    pub fn write(&mut self, container: &[u8], chunk_bytes: usize) -> Result<u32, LineError> {
-        let done = |reply: Reply<'_>| assert_eq!(reply, Reply::Done);
-        let begin = Request::Begin {
-            length: container.len().try_into().expect("a container's length"),
-            crc: crc_of(container).expect("a container's CRC"),
-        };
-        self.ask(&begin, done)?;
-        for (index, data) in container.chunks(chunk_bytes).enumerate() {
-            let offset = (index * chunk_bytes) as u16;
-            self.ask(&Request::Chunk { offset, data }, done)?;
-        }
-        self.ask(&Request::Commit, |reply| match reply {
-            Reply::Committed { write_count } => write_count,
-            other => panic!("{other:?}"),
-        })
     }
 }
