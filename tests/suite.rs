@@ -4,6 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use std::collections::BTreeMap;
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -486,15 +487,49 @@ fn a_report_goes_where_it_is_asked_for_and_replaces_nothing_but_a_report() {
         assert_eq!(written.code, Some(0), "{written:?}");
     }
     assert!(evolver.text("results/report.html").contains("<h1>"));
-    fs::create_dir(evolver.folder().join("letters")).unwrap();
-    evolver.write("letters/mother.txt", b"dear");
-    let refused = report("letters");
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(refused.stderr.contains("letters"), "{refused:?}");
-    assert_eq!(
-        fs::read_dir(evolver.folder().join("letters"))
-            .unwrap()
-            .count(),
-        1
-    );
+    let with_gallery = |to: &str| {
+        let report = ["suite", "own.toml", "report", "--out", "suite", "--gallery"];
+        evolver.run(&[&report[..], &["--to", to]].concat())
+    };
+    for to in ["results", "results", "new", "new"] {
+        let written = with_gallery(to);
+        assert_eq!(written.code, Some(0), "{written:?}");
+    }
+    fs::create_dir(evolver.folder().join("said")).unwrap();
+    evolver.write("said/looked-into.md", b"Chance.\n");
+    assert_eq!(report("said").code, Some(0));
+
+    let (ours, kept) = (evolver.read("results/report.html"), b"dear");
+    for (folder, file, with_ours) in [
+        ("letters", "mother.txt", false),
+        ("letters-on-what-was-looked-into", "looked-into.md", false),
+        ("pictures", "gallery/index.html", false),
+        ("photographs", "gallery/one.png", true),
+        ("file", "gallery", true),
+        ("of-work", "report.html", false),
+    ] {
+        let path = format!("{folder}/{file}");
+        let inside = evolver.folder().join(&path);
+        fs::create_dir_all(inside.parent().unwrap()).unwrap();
+        evolver.write(&path, kept);
+        if with_ours {
+            evolver.write(&format!("{folder}/report.html"), &ours);
+        }
+        if file == "looked-into.md" {
+            evolver.write(&format!("{folder}/table-1.csv"), kept);
+        }
+        let before = evolver.files();
+        assert_refused(&with_gallery(folder), &[folder, "--to"]);
+        assert_refused(&report(folder), &[folder, "--to"]);
+        assert_eq!(evolver.files(), before);
+        assert_eq!(evolver.read(&path), kept);
+    }
+}
+
+#[test]
+fn the_report_of_the_papers_runs_may_be_written_again() {
+    let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/results");
+    assert!(minimal_surprise_evolver::suite::report::may_be_written(
+        &results
+    ));
 }

@@ -233,8 +233,8 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
             let out = to.clone().unwrap_or_else(|| directory.join("report"));
             if !report::may_be_written(&out) {
                 return Err(BadInput::new(format!(
-                    "--to = {}: it holds something else than a report; name a new directory, or \
-                     one with a report to replace",
+                    "{}: it holds something else than a report; name with --to a new directory, or \
+                     one with a report of this program to replace",
                     out.display()
                 ))
                 .into());
