@@ -1,9 +1,11 @@
 //! Suites, run as a user would run them: one machine or many, interrupted or not, one result.
 
+use minimal_surprise_evolver::suite::{Suite, report};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use std::collections::BTreeMap;
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -44,7 +46,13 @@ fn with_the_suite() -> Evolver {
 
 /// The hash of all runs, as `status` says it.
 fn hash_by_status(evolver: &Evolver) -> String {
-    let status = evolver.run(&["suite", "own.toml", "status", "--out", "suite"]);
+    hash_by(evolver, &[])
+}
+
+/// The hash of some runs, as `status` says it.
+fn hash_by(evolver: &Evolver, choice: &[&str]) -> String {
+    let status = ["suite", "own.toml", "status", "--out", "suite"];
+    let status = evolver.run(&[&status[..], choice].concat());
     let lines = status.stdout.lines();
     let hash = lines.filter_map(|line| line.strip_prefix("hash ")).next();
     hash.unwrap_or_else(|| panic!("no hash in {status:?}"))
@@ -351,6 +359,8 @@ fn plan_and_status_count_the_runs() {
     let evolver = with_the_suite();
     let plan = evolver.run(&["suite", "own.toml", "plan"]);
     assert!(plan.stdout.contains("6 different runs"), "{plan:?}");
+    // 6 runs of 20 robots, 6 genomes, 25 generations, 2 repetitions, 40 steps.
+    assert!(plan.stdout.contains("1.4 million robot-steps"), "{plan:?}");
     let none = evolver.run(&["suite", "own.toml", "status", "--out", "suite"]);
     assert_eq!(none.stdout.matches("0 of 3 done").count(), 2, "{none:?}");
     let one = evolver.run(&[&RUN[..], &["--runs", "1"]].concat());
@@ -362,7 +372,15 @@ fn plan_and_status_count_the_runs() {
         "{status:?}"
     );
     let paper = evolver.run(&["paper", "plan"]);
-    assert!(paper.stdout.contains("600 different runs"), "{paper:?}");
+    for words in [
+        "600 different runs",
+        "predefined, geometry                       20 new starts",
+        "densities, triangular lattice               3 areas, 20 times",
+        "if no run of densities has a line: up to 1000 runs more",
+        " billion robot-steps",
+    ] {
+        assert!(paper.stdout.contains(words), "no {words:?}: {paper:?}");
+    }
     let times = evolver.run(&["paper", "plan", "--runs-times", "10", "--only", "noise"]);
     assert!(times.stdout.contains("1200 different runs"), "{times:?}");
 }
@@ -372,12 +390,36 @@ fn a_run_of_a_suite_is_the_run_of_its_settings() {
     let evolver = with_the_suite();
     let run = evolver.run(&[&RUN[..], &["--runs", "1"]].concat());
     assert_eq!(run.code, Some(0), "{run:?}");
-    let hashes = evolver.text("suite/hashes.txt");
-    let (id, hash) = hashes.lines().next().unwrap().split_once(' ').unwrap();
-    let config = format!("suite/runs/{id}/config.toml");
-    let again = evolver.run(&["evolve", &config, "--out", "again"]);
+    let files = evolver.files();
+    let config = files.iter().find(|file| file.ends_with("/config.toml"));
+    let config = config.expect("a run has its settings");
+    let again = evolver.run(&["evolve", config, "--out", "again"]);
     assert_eq!(again.code, Some(0), "{again:?}");
-    assert_eq!(evolver.text("again/DONE").trim(), hash);
+    let done = config.replace("config.toml", "DONE");
+    assert_eq!(evolver.text("again/DONE"), evolver.text(&done));
+}
+
+#[test]
+fn the_hashes_of_a_part_do_not_take_the_place_of_the_wholes() {
+    let evolver = with_the_suite();
+    let part = |choice: &[&str]| {
+        let run = evolver.run(&[&RUN[..], choice].concat());
+        assert_eq!(run.code, Some(0), "{run:?}");
+        assert!(run.stdout.contains("\"hash\":\""), "{run:?}");
+    };
+    part(&["--runs", "1"]);
+    assert!(!evolver.files().iter().any(|file| file.contains("hashes")));
+    let whole = hashes_after(&evolver);
+    assert_eq!(whole.lines().count(), 6);
+    for choice in [
+        &["--runs", "1"][..],
+        &["--runs-times", "1"],
+        &["--only", "two-grids"],
+        &["--all"],
+    ] {
+        part(choice);
+        assert_eq!(evolver.text("suite/hashes.txt"), whole);
+    }
 }
 
 #[test]
@@ -419,7 +461,7 @@ fn bad_suites_are_refused_with_their_place() {
 }
 
 #[test]
-fn a_directory_that_cannot_be_written_is_said_to_be() {
+fn a_file_in_the_way_of_a_suite_is_named() {
     let evolver = with_the_suite();
     evolver.write("suite", b"a file");
     let run = evolver.run(&RUN);
@@ -443,12 +485,12 @@ impl SmallDisk {
             .then(|| Self(path))
     }
 
-    fn grow_to(&self, size: &str) {
-        let grown = Command::new("mount")
-            .args(["-o", &format!("remount,size={size}")])
+    fn remount(&self, option: &str) {
+        let mounted = Command::new("mount")
+            .args(["-o", &format!("remount,{option}")])
             .arg(&self.0)
             .status();
-        assert!(grown.unwrap().success());
+        assert!(mounted.unwrap().success());
     }
 }
 
@@ -469,7 +511,7 @@ fn a_suite_on_a_full_disk_says_so_and_goes_on_when_there_is_room() {
     assert_eq!(full.code, Some(1), "{full:?}");
     assert!(full.stderr.contains("No space left"), "{full:?}");
     assert!(full.stderr.contains("suite/runs/"), "{full:?}");
-    disk.grow_to("8m");
+    disk.remount("size=8m");
     let again = evolver.run(&RUN);
     assert_eq!(again.code, Some(0), "{again:?}");
     assert_eq!(evolver.text("suite/hashes.txt"), expected());
@@ -486,15 +528,220 @@ fn a_report_goes_where_it_is_asked_for_and_replaces_nothing_but_a_report() {
         assert_eq!(written.code, Some(0), "{written:?}");
     }
     assert!(evolver.text("results/report.html").contains("<h1>"));
-    fs::create_dir(evolver.folder().join("letters")).unwrap();
-    evolver.write("letters/mother.txt", b"dear");
-    let refused = report("letters");
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(refused.stderr.contains("letters"), "{refused:?}");
-    assert_eq!(
-        fs::read_dir(evolver.folder().join("letters"))
-            .unwrap()
-            .count(),
-        1
+    let with_gallery = |to: &str| {
+        let report = ["suite", "own.toml", "report", "--out", "suite", "--gallery"];
+        evolver.run(&[&report[..], &["--to", to]].concat())
+    };
+    for to in ["results", "results", "new", "new"] {
+        let written = with_gallery(to);
+        assert_eq!(written.code, Some(0), "{written:?}");
+    }
+    fs::create_dir(evolver.folder().join("said")).unwrap();
+    evolver.write("said/looked-into.md", b"Chance.\n");
+    assert_eq!(report("said").code, Some(0));
+
+    let (ours, kept) = (evolver.read("results/report.html"), b"dear");
+    for (folder, file, with_ours) in [
+        ("letters", "mother.txt", false),
+        ("letters-on-what-was-looked-into", "looked-into.md", false),
+        ("pictures", "gallery/index.html", false),
+        ("photographs", "gallery/one.png", true),
+        ("file", "gallery", true),
+        ("of-work", "report.html", false),
+    ] {
+        let path = format!("{folder}/{file}");
+        let inside = evolver.folder().join(&path);
+        fs::create_dir_all(inside.parent().unwrap()).unwrap();
+        evolver.write(&path, kept);
+        if with_ours {
+            evolver.write(&format!("{folder}/report.html"), &ours);
+        }
+        if file == "looked-into.md" {
+            evolver.write(&format!("{folder}/table-1.csv"), kept);
+        }
+        let before = evolver.files();
+        assert_refused(&with_gallery(folder), &[folder, "--to"]);
+        assert_refused(&report(folder), &[folder, "--to"]);
+        assert_eq!(evolver.files(), before);
+        assert_eq!(evolver.read(&path), kept);
+    }
+}
+
+#[test]
+fn the_report_of_the_papers_runs_may_be_written_again() {
+    let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/results");
+    assert!(report::may_be_written(&results));
+}
+
+#[test]
+fn a_damaged_run_is_not_counted_as_done_and_every_command_names_it() {
+    let evolver = with_the_suite();
+    let one = ["--runs", "1"];
+    assert_eq!(evolver.run(&[&RUN[..], &one].concat()).code, Some(0));
+    let hash = hash_by(&evolver, &one);
+    let runs = fs::read_dir(evolver.folder().join("suite/runs")).unwrap();
+    let run = runs.flatten().next().unwrap().file_name();
+    let run = format!("suite/runs/{}", run.to_string_lossy());
+    let verb = |verb: &str| {
+        let called = ["suite", "own.toml", verb, "--out", "suite"];
+        evolver.run(&[&called[..], &one].concat())
+    };
+    let (name, whole) = (
+        format!("{run}/final.json"),
+        evolver.text(&format!("{run}/final.json")),
     );
+    let later = whole.replace("\"schema_version\": ", "\"schema_version\": 9");
+    assert_ne!(later, whole);
+    for damage in [None, Some(later)] {
+        match &damage {
+            None => fs::remove_file(evolver.folder().join(&name)).unwrap(),
+            Some(text) => evolver.write(&name, text.as_bytes()),
+        }
+        let what = if damage.is_some() {
+            "schema version 9"
+        } else {
+            "no final.json"
+        };
+        let words = [what, &format!("delete {run},")];
+        let status = verb("status");
+        assert_refused(&status, &words);
+        assert!(
+            status.stdout.contains("1 of 2 different runs done"),
+            "{status:?}"
+        );
+        assert!(!status.stdout.contains("hash "), "{status:?}");
+        assert_refused(&verb("run"), &words);
+        assert_refused(&verb("report"), &words);
+        let resumed = evolver.run(&["evolve", "--resume", &run]);
+        assert_refused(&resumed, &words);
+        assert!(!resumed.stdout.contains("complete"), "{resumed:?}");
+    }
+    assert!(!evolver.folder().join("suite/report").exists());
+    fs::remove_dir_all(evolver.folder().join(&run)).unwrap();
+    assert_eq!(verb("run").code, Some(0));
+    assert_eq!(hash_by(&evolver, &one), hash);
+}
+
+#[test]
+fn a_report_of_no_run_at_all_is_refused() {
+    let evolver = with_the_suite();
+    let report = ["suite", "own.toml", "report", "--out", "siute"];
+    assert_refused(&evolver.run(&report), &["siute", "--out"]);
+    assert_refused(&evolver.run(&["paper", "report"]), &["runs/paper", "--out"]);
+    assert_eq!(evolver.files(), ["own.toml"], "nothing was written");
+}
+
+#[test]
+fn after_tasks_it_is_said_which_command_searches_for_a_structure() {
+    let evolver = Evolver::in_empty_folder();
+    // Lines are not to be had of two robots.
+    let damage = "[[resilience]]\nname = \"damage\"\nof = \"two-grids\"\nstructure = \"line\"\n\
+                  robots-in-areas = [1]\nrepeat = 1\nfurther-runs = 3\n";
+    let suite = SUITE.replace("[20]", "[2]") + damage;
+    evolver.write("own.toml", suite.as_bytes());
+    let task = |more: &[&str]| {
+        let task = ["run-task", "--suite", "own.toml", "--out", "a suite"];
+        let run = evolver.run(&[&task[..], more].concat());
+        assert_eq!(run.code, Some(0), "{run:?}");
+        run.stdout
+    };
+    let status = || evolver.run(&["suite", "own.toml", "status", "--out", "a suite"]);
+    let command = "evolver suite own.toml run --out 'a suite'";
+    let first = task(&["--shard", "0/2"]);
+    assert!(first.contains(command), "{first}");
+    assert!(status().stdout.contains(command), "{:?}", status());
+    let second = task(&["--shard", "1/2", "--progress", "json"]);
+    assert!(
+        second.contains(&format!("\"search_by\":\"{command}\"")),
+        "{second}"
+    );
+    assert!(status().stdout.contains(command), "{:?}", status());
+    let other = task(&["--shard", "1/2", "--runs", "1"]);
+    assert!(!other.contains(command), "another experiment: {other}");
+
+    let run = evolver.run(&["suite", "own.toml", "run", "--out", "a suite"]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let after = status().stdout;
+    assert!(!after.contains(command), "{after}");
+    assert!(
+        after.contains("no line in 3 runs beyond the plan"),
+        "{after}"
+    );
+    let again = task(&["--shard", "1/2"]);
+    assert!(!again.contains(command), "{again}");
+}
+
+/// The keys that something wrong is said to be none of.
+fn keys_said_with(suite: &str) -> Vec<String> {
+    let error = Suite::parse(Path::new("own.toml"), suite).unwrap_err();
+    let text = error.to_string();
+    let (_, expected) = text.split_once("expected one of ").expect("what is valid");
+    let parts = expected.split('`').skip(1).step_by(2);
+    parts.map(str::to_owned).collect()
+}
+
+#[test]
+fn every_key_of_a_suite_is_explained() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/suite.md");
+    let docs = fs::read_to_string(docs).unwrap();
+    for (table, number) in [
+        ("", 4),
+        ("experiment", 14),
+        ("re-evaluation", 3),
+        ("resilience", 6),
+    ] {
+        let wrong = match table {
+            "" => "wrong = 1\n".to_owned(),
+            table => format!("[[{table}]]\nwrong = 1\n"),
+        };
+        let keys = keys_said_with(&wrong);
+        assert_eq!(keys.len(), number, "{keys:?}");
+        let heading = match table {
+            "" => "## The suite".to_owned(),
+            table => format!("## `[[{table}]]`"),
+        };
+        let (_, section) = docs.split_once(&heading).expect("a section a table");
+        let section = section.split("\n## ").next().unwrap_or_default();
+        for key in keys {
+            assert!(
+                section.contains(&format!("\n| `{key}`")),
+                "{table}: no {key}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_suite_in_a_directory_that_is_read_only_says_so_and_what_is_done_can_be_read() {
+    let evolver = with_the_suite();
+    let Some(disk) = SmallDisk::mounted_at(evolver.folder().join("suite"), "8m") else {
+        println!("skipped: no file system can be mounted here");
+        return;
+    };
+    disk.remount("ro");
+    let nothing = evolver.run(&RUN);
+    assert_eq!(nothing.code, Some(1), "{nothing:?}");
+    for words in ["suite/runs", "Read-only file system"] {
+        assert!(nothing.stderr.contains(words), "no {words:?}: {nothing:?}");
+    }
+    disk.remount("rw");
+    let one = evolver.run(&[&RUN[..], &["--runs", "1"]].concat());
+    assert_eq!(one.code, Some(0), "{one:?}");
+    disk.remount("ro");
+    let status = evolver.run(&["suite", "own.toml", "status", "--out", "suite"]);
+    assert!(
+        status.stdout.contains("2 of 6 different runs done"),
+        "{status:?}"
+    );
+    let more = evolver.run(&RUN);
+    assert_eq!(more.code, Some(1), "{more:?}");
+    assert!(more.stderr.contains("Read-only file system"), "{more:?}");
+    let report = ["suite", "own.toml", "report", "--out", "suite"];
+    let there = evolver.run(&report);
+    assert_eq!(there.code, Some(1), "{there:?}");
+    assert!(there.stderr.contains("suite/report"), "{there:?}");
+    let elsewhere = evolver.run(&[&report[..], &["--to", "report"]].concat());
+    assert_eq!(elsewhere.code, Some(0), "{elsewhere:?}");
+    disk.remount("rw");
+    assert_eq!(hashes_after(&evolver), expected());
 }

@@ -44,6 +44,18 @@ pub enum ReadRunError {
         /// The file that is missing.
         missing: &'static str,
     },
+    /// The run is marked complete, and is not.
+    #[error(
+        "{error}\nthe run is marked complete, so it was damaged, or made by another version: \
+         delete {}, and the command that made it does it again",
+        path.display()
+    )]
+    Damaged {
+        /// The directory.
+        path: PathBuf,
+        /// What is wrong.
+        error: Box<ReadRunError>,
+    },
     /// A file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
@@ -163,6 +175,21 @@ struct FinalFile {
     r#final: Vec<Pose>,
 }
 
+fn check_version(path: &Path, bytes: &[u8]) -> Result<(), StateError> {
+    let read = serde_json::from_slice(bytes);
+    let version: VersionOnly = read.map_err(|error| StateError::Json {
+        path: path.to_owned(),
+        error,
+    })?;
+    if version.schema_version != crate::report::tables::SCHEMA_VERSION {
+        return Err(StateError::OtherSchema {
+            path: path.to_owned(),
+            found: version.schema_version,
+        });
+    }
+    Ok(())
+}
+
 /// Reads a `final.json`.
 ///
 /// # Errors
@@ -172,13 +199,7 @@ pub fn parse_final_state(path: &Path, bytes: &[u8]) -> Result<FinalState, StateE
         path: path.to_owned(),
         error,
     };
-    let version: VersionOnly = serde_json::from_slice(bytes).map_err(json)?;
-    if version.schema_version != crate::report::tables::SCHEMA_VERSION {
-        return Err(StateError::OtherSchema {
-            path: path.to_owned(),
-            found: version.schema_version,
-        });
-    }
+    check_version(path, bytes)?;
     let file: FinalFile = serde_json::from_slice(bytes).map_err(json)?;
     let grid = crate::settings::parse_grid(&file.grid).map_err(|problem| StateError::Grid {
         path: path.to_owned(),
@@ -218,26 +239,54 @@ fn best_fitness(path: &Path) -> Result<Vec<f64>, ReadRunError> {
         })
 }
 
+/// The files of a complete run that it cannot be read back without.
+const FILES: [&str; 5] = [
+    "DONE",
+    "config.toml",
+    "best.genome",
+    "final.json",
+    "generations.csv",
+];
+
+fn all_there(path: &Path, files: &[&'static str]) -> Result<(), ReadRunError> {
+    match files.iter().find(|file| !path.join(file).is_file()) {
+        None => Ok(()),
+        Some(missing) => Err(ReadRunError::NotComplete {
+            path: path.to_owned(),
+            missing,
+        }),
+    }
+}
+
+/// Whether a run is complete, by a quick look at its directory.
+///
+/// # Errors
+/// [`ReadRunError::Damaged`] if it is marked so, but a file is missing or of another layout.
+pub fn is_complete(path: &Path) -> Result<bool, ReadRunError> {
+    if !path.join("DONE").is_file() {
+        return Ok(false);
+    }
+    let look = || {
+        all_there(path, &FILES)?;
+        all_there(path, &["meta.json"])?;
+        let state = path.join("final.json");
+        Ok(check_version(&state, &files::read(&state)?)?)
+    };
+    look()
+        .map(|()| true)
+        .map_err(|error| ReadRunError::Damaged {
+            path: path.to_owned(),
+            error: Box::new(error),
+        })
+}
+
 impl FinishedRun {
     /// Reads a run directory.
     ///
     /// # Errors
     /// [`ReadRunError`] if the run is not complete, or a file in it is wrong.
     pub fn read(path: &Path) -> Result<Self, ReadRunError> {
-        for missing in [
-            "DONE",
-            "config.toml",
-            "best.genome",
-            "final.json",
-            "generations.csv",
-        ] {
-            if !path.join(missing).is_file() {
-                return Err(ReadRunError::NotComplete {
-                    path: path.to_owned(),
-                    missing,
-                });
-            }
-        }
+        all_there(path, &FILES)?;
         let mut given = Given::default();
         given.file(&path.join("config.toml"))?;
         given.forget("from");

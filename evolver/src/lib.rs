@@ -1,8 +1,8 @@
 //! Evolution of minimal-surprise swarms on the host: the genetic algorithm, experiments, run
 //! directories, and the command line `evolver`.
 //!
-//! Data flows one way: [`settings`] → [`evolution`] → [`experiment`] → [`checkpoint`] and
-//! [`run_dir`] → [`finished_run`] → [`reevaluation`] and [`hil`] → [`report`] → [`commands`] →
+//! Data flows one way: [`settings`] → [`evolution`] → [`experiment`] → [`checkpoint`],
+//! [`finished_run`] and [`run_dir`] → [`reevaluation`] and [`hil`] → [`report`] → [`commands`] →
 //! [`cli`]. Beside it: [`robot`], a robot on a serial line.
 #![forbid(unsafe_code)]
 

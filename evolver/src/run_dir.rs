@@ -16,6 +16,7 @@
 use crate::checkpoint::{self, CheckpointError};
 use crate::experiment::{Experiment, Finding};
 use crate::files::{self, FileError};
+use crate::finished_run::{ReadRunError, is_complete};
 use crate::report::tables;
 use crate::settings::{Given, SettingError, Settings};
 use crate::time_spent::{TimeSpent, Timer};
@@ -58,6 +59,9 @@ pub enum RunDirError {
         /// The file that it should have.
         missing: &'static str,
     },
+    /// The run is marked complete, and is not.
+    #[error(transparent)]
+    Damaged(#[from] ReadRunError),
     /// Another process is at it.
     #[error("another process is working in {}", .0.display())]
     InUse(PathBuf),
@@ -174,12 +178,12 @@ impl RunDir {
             path: path.to_owned(),
             missing,
         };
+        if let Some(hash) = finished(path)? {
+            return Ok(Found::Finished(hash));
+        }
         let config = path.join(CONFIG);
         if !config.is_file() {
             return Err(missing(CONFIG));
-        }
-        if let Some(hash) = finished(path)? {
-            return Ok(Found::Finished(hash));
         }
         let lock = lock(path)?;
         // Once more: who had the lock until now may have completed it.
@@ -289,11 +293,11 @@ impl RunDir {
 }
 
 /// The hash of a complete run; what is not needed any more is removed.
-fn finished(directory: &Path) -> Result<Option<String>, FileError> {
-    let done = directory.join(DONE);
-    if !done.is_file() {
+fn finished(directory: &Path) -> Result<Option<String>, RunDirError> {
+    if !is_complete(directory)? {
         return Ok(None);
     }
+    let done = directory.join(DONE);
     let hash = files::read(&done)?;
     // It is only in the way of the eye, and the directory need not be ours.
     let _ = tidy(directory);

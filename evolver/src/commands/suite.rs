@@ -12,9 +12,10 @@ use crate::report::summary::shell_word;
 use crate::run_dir::{Found, RunDir, RunDirError};
 use crate::settings::count;
 use crate::suite::plan::{Plan, PlannedRun};
+use crate::suite::report::{self, ReportError};
 use crate::suite::search::{Search, look};
 use crate::suite::work::{Progress, Shard, Worked, progress, work_on};
-use crate::suite::{PAPER, Resilience, Suite, report, slurm};
+use crate::suite::{PAPER, Resilience, Suite, slurm};
 use clap::{Args, Subcommand, ValueEnum};
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -117,6 +118,13 @@ pub struct Choice {
     out: Option<PathBuf>,
 }
 
+impl Choice {
+    /// Whether it is the suite as it is written.
+    fn is_whole(&self) -> bool {
+        flags(self).is_empty()
+    }
+}
+
 /// How to work.
 #[derive(Debug, Args)]
 pub struct Manner {
@@ -193,14 +201,14 @@ pub fn run_task(arguments: &TaskArgs) -> anyhow::Result<ExitCode> {
     let read = read(&arguments.suite)?;
     let plan = plan(&read.suite, &arguments.choice)?;
     let directory = directory(&read.suite, &arguments.choice);
-    run(
-        &plan,
-        shard,
-        &[],
-        &directory,
-        &arguments.manner,
-        Others::WaitFor,
-    )
+    run(&Work {
+        read: &read,
+        choice: &arguments.choice,
+        plan: &plan,
+        directory: &directory,
+        manner: &arguments.manner,
+        share: Share::One(shard),
+    })
 }
 
 fn read(file: &Path) -> Result<Read, BadInput> {
@@ -224,25 +232,39 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
     let plan = plan(&read.suite, choice)?;
     let directory = directory(&read.suite, choice);
     match verb {
-        Verb::Plan(_) => print_plan(&plan),
+        Verb::Plan(_) => print_plan(&plan, &read.suite, searches(&read.suite, choice)),
         Verb::Status(_) => {
             print_status(&plan, &directory)?;
-            print_searches(&plan, &read.suite, &directory).map_err(BadInput::new)?;
+            print_searches(read, choice, &plan, &directory).map_err(BadInput::new)?;
         }
         Verb::Report { to, gallery, .. } => {
             let out = to.clone().unwrap_or_else(|| directory.join("report"));
             if !report::may_be_written(&out) {
                 return Err(BadInput::new(format!(
-                    "--to = {}: it holds something else than a report; name a new directory, or \
-                     one with a report to replace",
+                    "{}: it holds something else than a report; name with --to a new directory, or \
+                     one with a report of this program to replace",
                     out.display()
                 ))
                 .into());
             }
-            if *gallery {
-                write_gallery(&plan, &directory, &out.join(report::GALLERY))?;
+            let finished = finished(&plan.runs(), &directory).map_err(BadInput::new)?;
+            if finished.is_empty() {
+                return Err(BadInput::new(format!(
+                    "{}: no run of this suite is done there; --out names the directory that its \
+                     runs are in",
+                    directory.display()
+                ))
+                .into());
             }
-            let written = report::write(&plan, &read.suite, &directory, &out, &read.called)?;
+            if *gallery {
+                write_gallery(&finished, &out.join(report::GALLERY))?;
+            }
+            let written = report::write(&plan, &read.suite, &directory, &out, &read.called)
+                .map_err(|error| match error {
+                    ReportError::Run(error) => BadInput::new(error).into(),
+                    ReportError::Json { .. } => BadInput::new(error).into(),
+                    other => anyhow::Error::from(other),
+                })?;
             show_line!(
                 "{} of {} runs; {}",
                 written.finished,
@@ -251,19 +273,14 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
             );
         }
         Verb::Run { manner, .. } => {
-            // With another number of runs it is another experiment.
-            let searching = match choice.runs {
-                None => read.suite.resiliences.as_slice(),
-                Some(_) => &[],
-            };
-            return run(
-                &plan,
-                Shard::ALL,
-                searching,
-                &directory,
+            return run(&Work {
+                read,
+                choice,
+                plan: &plan,
+                directory: &directory,
                 manner,
-                Others::Leave,
-            );
+                share: Share::Whole,
+            });
         }
         Verb::Submit {
             engine: ClusterEngine::Slurm,
@@ -299,18 +316,11 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
 }
 
 /// The gallery of a plan's finished runs; an earlier one is replaced.
-fn write_gallery(plan: &Plan, directory: &Path, out: &Path) -> anyhow::Result<()> {
-    let runs = plan.runs();
-    let done = |run: &&&PlannedRun| progress(run, directory) == Progress::Done;
-    let finished = runs.iter().filter(done);
-    let finished: Vec<PathBuf> = finished.map(|run| run.directory(directory)).collect();
-    if finished.is_empty() {
-        return Ok(());
-    }
+fn write_gallery(finished: &[PathBuf], out: &Path) -> anyhow::Result<()> {
     if let Some(parent) = out.parent() {
         fs::create_dir_all(parent).map_err(files::FileError::at(parent))?;
     }
-    let written = gallery::write(&finished, out, Existing::Overwrite)?;
+    let written = gallery::write(finished, out, Existing::Overwrite)?;
     show_line!(
         "{} runs, {:.1} MB; {}",
         written.runs,
@@ -318,6 +328,17 @@ fn write_gallery(plan: &Plan, directory: &Path, out: &Path) -> anyhow::Result<()
         written.index.display()
     );
     Ok(())
+}
+
+/// The directories of the runs that are done.
+fn finished(runs: &[&PlannedRun], directory: &Path) -> Result<Vec<PathBuf>, ReadRunError> {
+    let mut finished = Vec::new();
+    for run in runs {
+        if progress(run, directory)? == Progress::Done {
+            finished.push(run.directory(directory));
+        }
+    }
+    Ok(finished)
 }
 
 /// The choice of runs as flags, for tasks.
@@ -359,23 +380,60 @@ fn directory(suite: &Suite, choice: &Choice) -> PathBuf {
     choice.out.clone().unwrap_or_else(named)
 }
 
-fn print_plan(plan: &Plan) {
+fn print_plan(plan: &Plan, suite: &Suite, searches: &[Resilience]) {
     for experiment in &plan.experiments {
         show_line!("{}", experiment.name);
         for settings in &experiment.settings {
             show_line!("  {:<40} {:>4} runs", settings.label, settings.runs.len());
         }
     }
+    let is_planned = |of: &str| plan.experiments.iter().any(|e| e.name == of);
+    for again in &suite.reevaluations {
+        let of: Vec<&str> = again.of.iter().map(String::as_str).collect();
+        let of: Vec<&str> = of.into_iter().filter(|of| is_planned(of)).collect();
+        if !of.is_empty() {
+            show_line!("{}", again.name);
+            show_line!("  {:<40} {:>4} new starts", of.join(", "), again.starts);
+        }
+    }
+    let resiliences = suite.resiliences.iter();
+    for damage in resiliences.filter(|damage| is_planned(&damage.of)) {
+        let Resilience { of, structure, .. } = damage;
+        show_line!("{}", damage.name);
+        show_line!(
+            "  {:<40} {:>4} areas, {} times",
+            format!("{of}, {structure}"),
+            damage.robots_in_areas.len(),
+            damage.repeat
+        );
+        if damage.further_runs > 0 && searches.contains(damage) {
+            show_line!(
+                "  if no run of {of} has a {structure}: up to {} runs more",
+                damage.further_runs
+            );
+        }
+    }
     let runs = plan.runs();
-    let robot_steps: u64 = runs
+    let robot_steps: f64 = runs
         .iter()
-        .map(|run| run.settings.robot_steps_per_generation() * u64::from(run.settings.generations))
+        .map(|run| {
+            run.settings.robot_steps_per_generation() as f64 * f64::from(run.settings.generations)
+        })
         .sum();
     show_line!(
-        "\n{} different runs, {:.1} billion robot-steps",
+        "\n{} different runs, {} robot-steps",
         runs.len(),
-        robot_steps as f64 / 1e9
+        in_words(robot_steps)
     );
+}
+
+/// A large number.
+fn in_words(number: f64) -> String {
+    match number {
+        1e9.. => format!("{:.1} billion", number / 1e9),
+        1e6.. => format!("{:.1} million", number / 1e6),
+        _ => format!("{number}"),
+    }
 }
 
 fn print_status(plan: &Plan, directory: &Path) -> Result<(), RunDirError> {
@@ -384,7 +442,8 @@ fn print_status(plan: &Plan, directory: &Path) -> Result<(), RunDirError> {
         for settings in &experiment.settings {
             let of = |state| {
                 let runs = settings.runs.iter();
-                runs.filter(|run| progress(run, directory) == state).count()
+                runs.filter(|run| progress(run, directory).is_ok_and(|found| found == state))
+                    .count()
             };
             let (done, begun) = (of(Progress::Done), of(Progress::Begun));
             show_line!(
@@ -395,21 +454,52 @@ fn print_status(plan: &Plan, directory: &Path) -> Result<(), RunDirError> {
         }
     }
     let runs = plan.runs();
-    let done = runs.len() - waiting(&runs, directory).len();
+    let is_done = |run: &&&PlannedRun| matches!(progress(run, directory), Ok(Progress::Done));
+    let done = runs.iter().filter(is_done).count();
     show_line!("\n{done} of {} different runs done", runs.len());
+    // An error if there is a damaged one.
+    let hashes = hashes(&runs, directory)?;
     if done == runs.len() {
-        show_line!("hash {}", hash_of(&hashes(&runs, directory)?));
+        show_line!("hash {}", hash_of(&hashes));
     }
     Ok(())
 }
 
-fn print_searches(plan: &Plan, suite: &Suite, directory: &Path) -> Result<(), ReadRunError> {
-    for asked in &suite.resiliences {
+/// The structures that are searched for.
+fn searches<'a>(suite: &'a Suite, choice: &Choice) -> &'a [Resilience] {
+    match choice.runs {
+        None => &suite.resiliences,
+        // With another number of runs it is another experiment.
+        Some(_) => &[],
+    }
+}
+
+/// The command that does the runs, and searches.
+fn command(read: &Read, choice: &Choice, directory: &Path) -> String {
+    let mut words = vec![read.called.clone(), "run".to_owned()];
+    let flags = flags(choice);
+    words.extend(flags.iter().map(|flag| shell_word(Path::new(flag))));
+    words.extend(["--out".to_owned(), shell_word(directory)]);
+    words.join(" ")
+}
+
+fn print_searches(
+    read: &Read,
+    choice: &Choice,
+    plan: &Plan,
+    directory: &Path,
+) -> Result<(), ReadRunError> {
+    let command = command(read, choice, directory);
+    for asked in searches(&read.suite, choice) {
         let said = match look(plan, asked, directory, 0)? {
             Search::NotNeeded => continue,
-            Search::Waits => "waits for the runs that it searches through".to_owned(),
+            Search::Waits => format!(
+                "waits for the runs that it searches through; then, if none has a {}, on with: \
+                 {command}",
+                asked.structure
+            ),
             Search::Next(_, number) => format!(
-                "no {} yet; {} runs beyond the plan done",
+                "no {} yet; {} runs beyond the plan done; on with: {command}",
                 asked.structure,
                 number - 1
             ),
@@ -426,24 +516,38 @@ fn print_searches(plan: &Plan, suite: &Suite, directory: &Path) -> Result<(), Re
     Ok(())
 }
 
-/// What to do about runs that other processes hold.
+/// Which of the runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Others {
-    /// Leave them to those.
-    Leave,
-    /// Wait for those, or for their end: whoever started this takes its success for the share's.
-    WaitFor,
+enum Share {
+    /// All, then those beyond the plan that experiments search through. Runs that other processes
+    /// hold are left to those.
+    Whole,
+    /// One of several. Runs that others hold are waited for, or for their end: whoever started this
+    /// takes its success for the share's.
+    One(Shard),
 }
 
-/// Does a share of the runs, then those beyond the plan that experiments search through.
-fn run(
-    plan: &Plan,
-    shard: Shard,
-    searching: &[Resilience],
-    directory: &Path,
-    manner: &Manner,
-    others: Others,
-) -> anyhow::Result<ExitCode> {
+/// What is to be done.
+struct Work<'a> {
+    read: &'a Read,
+    choice: &'a Choice,
+    plan: &'a Plan,
+    directory: &'a Path,
+    manner: &'a Manner,
+    share: Share,
+}
+
+fn run(work: &Work) -> anyhow::Result<ExitCode> {
+    let Work {
+        plan,
+        directory,
+        manner,
+        ..
+    } = *work;
+    let (shard, to_search) = match work.share {
+        Share::Whole => (Shard::ALL, searches(&work.read.suite, work.choice)),
+        Share::One(shard) => (shard, [].as_slice()),
+    };
     let threads = match &manner.threads {
         Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
         None => None,
@@ -452,15 +556,15 @@ fn run(
     let stop = stop_on_ctrl_c()?;
     let pool = thread_pool(threads)?;
     let worked = loop {
-        let worked = pool.install(|| work(plan, &runs, directory, manner.progress, &stop))?;
+        let worked = pool.install(|| do_all(plan, &runs, directory, manner.progress, &stop))?;
         match worked {
             Some(1..) if stop.load(Ordering::Relaxed) => break None,
-            Some(1..) if others == Others::WaitFor => std::thread::sleep(LOOK_AGAIN),
+            Some(1..) if work.share != Share::Whole => std::thread::sleep(LOOK_AGAIN),
             _ => break worked,
         }
     };
     let mut searched = worked.is_some();
-    for asked in searching {
+    for asked in to_search {
         searched =
             searched && pool.install(|| search(plan, asked, directory, manner.progress, &stop))?;
     }
@@ -469,14 +573,22 @@ fn run(
         eprintln!("interrupted; the same command goes on");
         return Ok(ExitCode::from(EXIT_INTERRUPTED));
     };
-    let done = runs.len() - waiting(&runs, directory).len();
+    let done = finished(&runs, directory).map_err(BadInput::new)?.len();
     let mut hash = None;
     if done == runs.len() {
         let hashes = hashes(&runs, directory)?;
-        files::replace(&directory.join(shard.hashes_file()), hashes.as_bytes())?;
+        // A part's would take the place of the whole's.
+        if work.choice.is_whole() {
+            let file = directory.join(shard.hashes_file());
+            files::replace(&file, hashes.as_bytes())?;
+        }
         // A share's would be one that no other number of shares gives.
         hash = (shard == Shard::ALL).then(|| hash_of(&hashes));
     }
+    let search_by = match work.share {
+        Share::Whole => None,
+        Share::One(_) => search_by(work),
+    };
     if manner.progress == ProgressMode::Json {
         show_line!(
             "{}",
@@ -485,6 +597,7 @@ fn run(
                 "runs_done": done,
                 "runs": runs.len(),
                 "hash": hash,
+                "search_by": search_by,
             })
         );
     } else {
@@ -500,25 +613,45 @@ fn run(
         if let Some(hash) = hash {
             show_line!("hash {hash}");
         }
+        if let Some(command) = search_by {
+            show_line!("for a structure that no run formed, once all are done: {command}");
+        }
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn waiting<'a>(runs: &[&'a PlannedRun], directory: &Path) -> Vec<&'a PlannedRun> {
-    let runs = runs.iter().copied();
-    runs.filter(|run| progress(run, directory) != Progress::Done)
-        .collect()
+/// The command that searches for a structure, if one may have to be searched for.
+fn search_by(work: &Work) -> Option<String> {
+    let Work {
+        read,
+        choice,
+        plan,
+        directory,
+        ..
+    } = *work;
+    // What cannot be read is in another share, and said by the command.
+    let is_needed = |asked: &Resilience| {
+        let looked = look(plan, asked, directory, 0);
+        matches!(looked, Ok(Search::Waits | Search::Next(..)) | Err(_))
+    };
+    let needed = searches(&read.suite, choice).iter().any(is_needed);
+    needed.then(|| command(read, choice, directory))
 }
 
 /// Does what is not done; the number of runs that others hold comes back, nothing if interrupted.
-fn work(
+fn do_all(
     plan: &Plan,
     runs: &[&PlannedRun],
     directory: &Path,
     mode: ProgressMode,
     stop: &AtomicBool,
 ) -> anyhow::Result<Option<usize>> {
-    let waiting = waiting(runs, directory);
+    let mut waiting = Vec::new();
+    for &run in runs {
+        if progress(run, directory).map_err(BadInput::new)? != Progress::Done {
+            waiting.push(run);
+        }
+    }
     let shown = SuiteProgress::start(mode, plan, runs, waiting.len());
     let mut elsewhere = 0;
     for run in waiting {
@@ -554,7 +687,9 @@ fn search(
     let shown = SearchProgress::start(mode, &asked.name);
     let mut after = 0;
     let ended = loop {
-        let Search::Next(run, number) = look(plan, asked, directory, after)? else {
+        let Search::Next(run, number) =
+            look(plan, asked, directory, after).map_err(BadInput::new)?
+        else {
             break true;
         };
         shown.begins(&run, number, &asked.name);
@@ -573,6 +708,9 @@ fn search(
 fn hashes(runs: &[&PlannedRun], directory: &Path) -> Result<String, RunDirError> {
     let mut text = String::new();
     for run in runs {
+        if progress(run, directory)? != Progress::Done {
+            continue;
+        }
         // Opened, not only read: what a process left that was killed at the very end goes.
         if let Found::Finished(hash) = RunDir::open(&run.directory(directory))? {
             text += &format!("{} {hash}\n", run.id);
@@ -585,4 +723,16 @@ fn hashes(runs: &[&PlannedRun], directory: &Path) -> Result<String, RunDirError>
 fn hash_of(hashes: &str) -> String {
     let hash = Sha256::digest(hashes.as_bytes());
     hash.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_words;
+
+    #[test]
+    fn a_small_plan_is_not_said_to_be_nothing() {
+        assert_eq!(in_words(450e9), "450.0 billion");
+        assert_eq!(in_words(14.4e6), "14.4 million");
+        assert_eq!(in_words(72_000.0), "72000");
+    }
 }

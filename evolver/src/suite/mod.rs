@@ -140,6 +140,68 @@ fn default_first_seed() -> u64 {
     1
 }
 
+/// Most areas of a resilience: they are called A to Z.
+const AREAS_MAX: usize = 26;
+
+/// Most of anything that is counted in a suite, as on the command line.
+const COUNT_MAX: u32 = 1_000_000;
+
+fn check_count(key: &str, value: u32) -> Result<(), String> {
+    if (1..=COUNT_MAX).contains(&value) {
+        return Ok(());
+    }
+    Err(format!(
+        "{key} = {value}: expected at least 1, at most {COUNT_MAX}"
+    ))
+}
+
+fn check_list<T>(key: &str, list: &[T]) -> Result<(), String> {
+    if list.is_empty() {
+        return Err(format!("{key} = []: expected at least one"));
+    }
+    Ok(())
+}
+
+fn check_of(of: &str, names: &[&str]) -> Result<(), String> {
+    if names.contains(&of) {
+        return Ok(());
+    }
+    Err(format!("of = {of:?}: experiments are {}", names.join(", ")))
+}
+
+/// Seeds after the first one have to be there.
+fn check_seeds(first_seed: u64, runs: u32) -> Result<(), String> {
+    match first_seed.checked_add(u64::from(runs)) {
+        Some(_) => Ok(()),
+        None => Err(format!(
+            "first-seed = {first_seed}: expected at most {} with {runs} runs",
+            u64::MAX - u64::from(runs)
+        )),
+    }
+}
+
+impl Experiment {
+    fn check(&self) -> Result<(), String> {
+        check_count("runs", self.runs)?;
+        check_list("grids", &self.grids)?;
+        check_list("robots", &self.robots)?;
+        check_list("sensor-models", &self.sensor_models)?;
+        check_list("noise", &self.noise)?;
+        check_list("predictions", &self.predictions)?;
+        check_seeds(self.first_seed, self.runs)?;
+        let settings = plan::settings_of(self);
+        settings.map(|_| ()).map_err(|error| error.to_string())
+    }
+}
+
+impl Reevaluation {
+    fn check(&self, names: &[&str]) -> Result<(), String> {
+        check_list("of", &self.of)?;
+        self.of.iter().try_for_each(|of| check_of(of, names))?;
+        check_count("starts", self.starts)
+    }
+}
+
 /// A suite cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SuiteError {
@@ -159,6 +221,12 @@ pub enum SuiteError {
         /// What is wrong.
         error: Box<toml::de::Error>,
     },
+    /// It has nothing to do.
+    #[error("{}: no [[experiment]]: expected at least one", path.display())]
+    NoExperiment {
+        /// The file.
+        path: PathBuf,
+    },
     /// A value is not valid.
     #[error("{}: experiment {experiment:?}: {problem}", path.display())]
     Invalid {
@@ -177,6 +245,41 @@ impl Resilience {
     pub fn structure(&self) -> Option<Structure> {
         let spaced = self.structure.replace('-', " ");
         Structure::ALL.into_iter().find(|s| s.name() == spaced)
+    }
+
+    fn check(&self, experiments: &[Experiment]) -> Result<(), String> {
+        let names: Vec<&str> = experiments.iter().map(|e| e.name.as_str()).collect();
+        check_of(&self.of, &names)?;
+        if self.structure().is_none() {
+            let names = Structure::ALL.map(Structure::name).join(", ");
+            return Err(format!(
+                "structure = {:?}: structures are {names}",
+                self.structure
+            ));
+        }
+        check_list("robots-in-areas", &self.robots_in_areas)?;
+        if self.robots_in_areas.len() > AREAS_MAX {
+            let found = self.robots_in_areas.len();
+            return Err(format!(
+                "robots-in-areas: {found} areas: expected at most {AREAS_MAX}"
+            ));
+        }
+        let of = experiments.iter().filter(|e| e.name == self.of);
+        // Some robot has to be left.
+        let most = of
+            .flat_map(|e| &e.robots)
+            .min()
+            .map_or(0, |robots| robots - 1);
+        for &robots in &self.robots_in_areas {
+            if !(1..=most).contains(&robots) {
+                return Err(format!(
+                    "robots-in-areas = {:?}: {robots}: expected from 1 to {most}, fewer than the \
+                     smallest swarm of {:?} has",
+                    self.robots_in_areas, self.of
+                ));
+            }
+        }
+        check_count("repeat", self.repeat)
     }
 }
 
@@ -216,44 +319,26 @@ impl Suite {
             problem,
         };
         let names: Vec<&str> = suite.experiments.iter().map(|e| e.name.as_str()).collect();
+        if names.is_empty() {
+            return Err(SuiteError::NoExperiment {
+                path: path.to_owned(),
+            });
+        }
         for (index, experiment) in suite.experiments.iter().enumerate() {
-            if experiment.runs == 0 {
-                return Err(invalid(
-                    &experiment.name,
-                    "runs = 0: expected at least 1".into(),
-                ));
-            }
-            if names[..index].contains(&experiment.name.as_str()) {
-                return Err(invalid(
-                    &experiment.name,
-                    "two experiments have this name".into(),
-                ));
-            }
-            plan::settings_of(experiment)
-                .map_err(|error| invalid(&experiment.name, error.to_string()))?;
+            let problem = if names[..index].contains(&experiment.name.as_str()) {
+                Err("two experiments have this name".to_owned())
+            } else {
+                experiment.check()
+            };
+            problem.map_err(|problem| invalid(&experiment.name, problem))?;
         }
-        let referring = suite
-            .reevaluations
-            .iter()
-            .flat_map(|r| r.of.iter().map(|of| (r.name.as_str(), of.as_str())))
-            .chain(
-                suite
-                    .resiliences
-                    .iter()
-                    .map(|r| (r.name.as_str(), r.of.as_str())),
-            );
-        for (name, of) in referring {
-            if !names.contains(&of) {
-                let problem = format!("of = {of:?}: experiments are {}", names.join(", "));
-                return Err(invalid(name, problem));
-            }
+        for again in &suite.reevaluations {
+            let problem = again.check(&names);
+            problem.map_err(|problem| invalid(&again.name, problem))?;
         }
-        for asked in &suite.resiliences {
-            if asked.structure().is_none() {
-                let names = Structure::ALL.map(Structure::name).join(", ");
-                let problem = format!("structure = {:?}: structures are {names}", asked.structure);
-                return Err(invalid(&asked.name, problem));
-            }
+        for damage in &suite.resiliences {
+            let problem = damage.check(&suite.experiments);
+            problem.map_err(|problem| invalid(&damage.name, problem))?;
         }
         Ok(suite)
     }
@@ -308,5 +393,114 @@ mod tests {
         );
         let of = "[[re-evaluation]]\nname = \"again\"\nof = [\"two\"]\nstarts = 3\n";
         assert!(error(&format!("{head}{of}")).contains("experiments are one"));
+    }
+
+    #[test]
+    fn a_value_that_nothing_could_be_made_of_is_named_with_what_is_valid() {
+        let head = "name = \"own\"\n";
+        let experiment = "[[experiment]]\nname = \"one\"\nruns = 2\n";
+        let again = "[[re-evaluation]]\nname = \"again\"\nof = [\"one\"]\nstarts = 3\n";
+        let damage = "[[resilience]]\nname = \"damage\"\nof = \"one\"\nstructure = \"line\"\n\
+                      robots-in-areas = [3, 4]\nrepeat = 2\n";
+        let parse = |text: &str| Suite::parse(Path::new("own.toml"), text);
+        let whole = format!("{head}{experiment}{again}{damage}");
+        parse(&whole).unwrap();
+        let robots = |list: &str| format!("runs = 2\nrobots = {list}\n");
+        for (from, to, words) in [
+            (
+                "runs = 2\n",
+                robots("[]"),
+                ["one", "robots = []", "at least one"],
+            ),
+            (
+                "runs = 2\n",
+                "runs = 2\ngrids = []\n".into(),
+                ["one", "grids = []", "at least one"],
+            ),
+            (
+                "runs = 2\n",
+                "runs = 2\nnoise = []\n".into(),
+                ["one", "noise = []", "at least one"],
+            ),
+            (
+                "runs = 2\n",
+                "runs = 2\nsensor-models = []\n".into(),
+                ["one", "sensor-models = []", "at least one"],
+            ),
+            (
+                "runs = 2\n",
+                "runs = 2\npredictions = []\n".into(),
+                ["one", "predictions = []", "at least one"],
+            ),
+            (
+                "runs = 2\n",
+                "runs = 1000001\n".into(),
+                ["one", "runs = 1000001", "at most 1000000"],
+            ),
+            (
+                "starts = 3",
+                "starts = 0".into(),
+                ["again", "starts = 0", "at least 1"],
+            ),
+            (
+                "of = [\"one\"]",
+                "of = []".into(),
+                ["again", "of = []", "at least one"],
+            ),
+            (
+                "repeat = 2",
+                "repeat = 0".into(),
+                ["damage", "repeat = 0", "at least 1"],
+            ),
+            (
+                "[3, 4]",
+                "[]".into(),
+                ["damage", "robots-in-areas = []", "at least one"],
+            ),
+            (
+                "[3, 4]",
+                "[3, 0]".into(),
+                ["damage", "robots-in-areas = [3, 0]", "from 1 to 99"],
+            ),
+            (
+                "[3, 4]",
+                "[100, 3]".into(),
+                ["damage", "robots-in-areas = [100, 3]", "from 1 to 99"],
+            ),
+            (
+                "runs = 2\n",
+                robots("[4, 50]"),
+                ["damage", "[3, 4]: 4", "from 1 to 3"],
+            ),
+            (
+                "[3, 4]",
+                format!("[{}]", "3, ".repeat(27)),
+                ["damage", "27 areas", "at most 26"],
+            ),
+        ] {
+            let error = parse(&whole.replacen(from, &to, 1))
+                .unwrap_err()
+                .to_string();
+            for word in words {
+                assert!(error.contains(word), "no {word:?} in {error}");
+            }
+        }
+        let none = parse(head).unwrap_err().to_string();
+        assert!(none.contains("no [[experiment]]"), "{none}");
+    }
+
+    #[test]
+    fn seeds_that_there_are_not_are_refused_before_any_run() {
+        let error = check_seeds(u64::MAX - 1, 2).unwrap_err();
+        assert!(
+            error.contains("first-seed = 18446744073709551614"),
+            "{error}"
+        );
+        assert!(error.contains("at most 18446744073709551613"), "{error}");
+        let mut suite = Suite::paper().unwrap();
+        suite.experiments[0].first_seed = u64::MAX - 50;
+        assert!(plan::Plan::new(&suite, None, Some(50), false).is_ok());
+        let error = plan::Plan::new(&suite, None, Some(51), false).unwrap_err();
+        assert!(error.to_string().contains("with 51 runs"), "{error}");
     }
 }

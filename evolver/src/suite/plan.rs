@@ -4,7 +4,7 @@
 //! what is computed with it, and the resolved settings with the seed. So finished work is found
 //! again and never mixed up, and experiments that ask for the same run share it.
 
-use super::{Experiment, Suite};
+use super::{Experiment, Suite, check_seeds};
 use crate::settings::{Given, SettingError, Settings};
 use minimal_surprise_controller::KERNEL_ID;
 use serde::Serialize;
@@ -104,6 +104,14 @@ pub enum PlanError {
         /// The names there are.
         names: Vec<String>,
     },
+    /// There are not so many seeds.
+    #[error("experiment {experiment:?}: {problem}")]
+    Seeds {
+        /// The experiment.
+        experiment: String,
+        /// What is wrong and what would be valid.
+        problem: String,
+    },
     /// A setting is not valid.
     #[error(transparent)]
     Setting(#[from] SettingError),
@@ -114,7 +122,7 @@ impl Plan {
     /// many if asked for. Optional experiments are in only if they are named or all are wanted.
     ///
     /// # Errors
-    /// [`PlanError`] if there is no such experiment.
+    /// [`PlanError`] if there is no such experiment, or not so many seeds.
     pub fn new(
         suite: &Suite,
         only: Option<&str>,
@@ -134,11 +142,18 @@ impl Plan {
             None => with_optional || !experiment.optional,
         };
         let experiments = suite.experiments.iter().filter(wanted).map(|experiment| {
+            let runs_of_each = runs.unwrap_or(experiment.runs);
+            check_seeds(experiment.first_seed, runs_of_each).map_err(|problem| {
+                PlanError::Seeds {
+                    experiment: experiment.name.clone(),
+                    problem,
+                }
+            })?;
             Ok(PlannedExperiment {
                 name: experiment.name.clone(),
                 settings: settings_of(experiment)?
                     .into_iter()
-                    .map(|settings| planned(&settings, experiment, runs))
+                    .map(|settings| planned(&settings, experiment.first_seed, runs_of_each))
                     .collect(),
             })
         });
@@ -161,9 +176,8 @@ impl Plan {
     }
 }
 
-fn planned(settings: &Settings, experiment: &Experiment, runs: Option<u32>) -> PlannedSettings {
-    let runs = (0..runs.unwrap_or(experiment.runs))
-        .map(|run| PlannedRun::new(settings, experiment.first_seed + u64::from(run)));
+fn planned(settings: &Settings, first_seed: u64, runs: u32) -> PlannedSettings {
+    let runs = (0..runs).map(|run| PlannedRun::new(settings, first_seed + u64::from(run)));
     PlannedSettings {
         label: label(settings),
         runs: runs.collect(),

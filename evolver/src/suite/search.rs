@@ -68,7 +68,7 @@ pub fn look(
 
 /// Whether a run is named after a structure; none if it is not done.
 fn has(run: &PlannedRun, structure: Structure, suite: &Path) -> Result<Option<bool>, ReadRunError> {
-    if progress(run, suite) != Progress::Done {
+    if progress(run, suite)? != Progress::Done {
         return Ok(None);
     }
     let finished = FinishedRun::read(&run.directory(suite))?;

@@ -1,11 +1,13 @@
 //! Work: doing the runs of a plan that are not done.
 //!
-//! Files in the suite's directory are the only truth: a run is done when its directory has `DONE`.
+//! Files in the suite's directory are the only truth: a run is done when its directory has `DONE`
+//! and what belongs to it.
 //! Any number of processes may work on the same plan; each takes runs that no other holds.
 
 use super::plan::{Plan, PlannedRun};
 use crate::evolving::until_finished;
 use crate::experiment::Experiment;
+use crate::finished_run::{ReadRunError, is_complete};
 use crate::run_dir::{Found, RunDir, RunDirError};
 use minimal_surprise_sim::{Engine, Path as CodePath};
 use std::path::Path;
@@ -69,16 +71,18 @@ pub enum Progress {
 }
 
 /// How far a run is, by its files.
-#[must_use]
-pub fn progress(run: &PlannedRun, suite: &Path) -> Progress {
+///
+/// # Errors
+/// [`ReadRunError::Damaged`] if it is marked complete, and is not.
+pub fn progress(run: &PlannedRun, suite: &Path) -> Result<Progress, ReadRunError> {
     let directory = run.directory(suite);
-    if directory.join("DONE").is_file() {
+    Ok(if is_complete(&directory)? {
         Progress::Done
     } else if directory.is_dir() {
         Progress::Begun
     } else {
         Progress::Pending
-    }
+    })
 }
 
 /// What became of a run that was to be done.
@@ -104,7 +108,7 @@ pub fn work_on(
 ) -> Result<Worked, RunDirError> {
     match begin_or_go_on(run, suite, stop, each_generation) {
         // Another process did the same run, unseen for lack of locks, and tidied up after both.
-        Err(_) if progress(run, suite) == Progress::Done => Ok(Worked::Completed),
+        Err(_) if matches!(progress(run, suite), Ok(Progress::Done)) => Ok(Worked::Completed),
         worked => worked,
     }
 }

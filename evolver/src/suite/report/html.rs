@@ -22,6 +22,9 @@ figure { margin: 2em 0; overflow-x: auto; } figcaption { color: var(--soft); fon
 svg { max-width: 100%; height: auto; } code { font-size: .9em; overflow-wrap: anywhere; }
 ";
 
+/// What says that a page is a report of this program.
+pub(super) const MARK: &str = "<meta name=\"generator\" content=\"minimal-surprise-evolver\">";
+
 /// Said where experiments share runs.
 pub(super) const SHARED: &str = "Experiments that ask for the same settings and seeds share their \
                                  runs; what is said of them is not independent.";
@@ -31,7 +34,7 @@ pub(super) const SHARED: &str = "Experiments that ask for the same settings and 
 pub fn page(report: &Report) -> String {
     let title = format!("Report of the suite {}", report.suite);
     let mut page = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{MARK}\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{0}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{0}</h1>\n",
         escape(&title)

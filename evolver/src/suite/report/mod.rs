@@ -171,17 +171,32 @@ struct RunRow<'a> {
 /// Where a report links to, in its directory, if there is a gallery of its runs.
 pub const GALLERY: &str = "gallery";
 
-/// Whether a report would replace nothing but a report: the directory is new or empty, or has one,
-/// or what is to be said in it.
+/// What every gallery's first page has in it, and nothing else is likely to.
+const GALLERY_MARK: &str = "<h1 class=\"grow\">Gallery</h1>";
+
+/// Whether a report would replace nothing but a report: the directory is new, or empty but for what
+/// is to be said in the report and what an earlier one left that was cut short, or its `report.html`
+/// is one of ours. A gallery in it must be one of ours, too.
 #[must_use]
 pub fn may_be_written(out: &Path) -> bool {
-    match std::fs::read_dir(out) {
-        Err(_) => !out.exists(),
-        Ok(mut entries) => {
-            let known = ["report.html", LOOKED_INTO, GALLERY];
-            entries.next().is_none() || known.iter().any(|name| out.join(name).exists())
-        }
+    let Ok(entries) = std::fs::read_dir(out) else {
+        return out.symlink_metadata().is_err();
+    };
+    let has = |name: &str, mark: &str| {
+        let text = std::fs::read(out.join(name)).unwrap_or_default();
+        String::from_utf8_lossy(&text).contains(mark)
+    };
+    let gallery = out.join(GALLERY);
+    if gallery.symlink_metadata().is_ok() && !has(&format!("{GALLERY}/index.html"), GALLERY_MARK) {
+        return false;
     }
+    has("report.html", html::MARK)
+        || entries.flatten().all(|entry| {
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            let cut_short = name.starts_with('.') && name.ends_with(files::PART);
+            name == LOOKED_INTO || name == GALLERY || cut_short
+        })
 }
 
 /// Writes the report of a plan's finished runs, with the data of its tables and figures as CSV.
