@@ -246,7 +246,7 @@ fn cell(value: &Value) -> String {
 fn write_making(page: &mut String, report: &Report) {
     page.push_str(
         "<h2>How it was made</h2>\n<div class=\"wide\"><table><thead><tr><th>runs</th><th>seeds</th>\
-         <th>minutes, CPU / clock</th><th>command and program</th><th>hash of the runs' hashes</th></tr></thead><tbody>\n",
+         <th>minutes, CPU / clock</th><th>command and program</th><th>SHA-256 of the outcomes</th></tr></thead><tbody>\n",
     );
     for making in &report.making {
         let _ = writeln!(

@@ -44,7 +44,7 @@ pub fn text(report: &Report) -> String {
             figure.id
         );
     }
-    text += "\n## How it was made\n\n| experiment | setting | runs | seeds | minutes, CPU / clock | command | program | hash of the runs' hashes |\n|---|---|---|---|---|---|---|---|\n";
+    text += "\n## How it was made\n\n| experiment | setting | runs | seeds | minutes, CPU / clock | command | program | SHA-256 of the outcomes |\n|---|---|---|---|---|---|---|---|\n";
     for making in &report.making {
         let _ = writeln!(
             text,

@@ -23,7 +23,7 @@ use crate::report::progress::seconds;
 use crate::time_spent::TimeSpent;
 use figures::{Figure, FigureError};
 use findings::{Finding, Verdict};
-use gather::{Gathered, Group};
+use gather::{Gathered, Group, Run, hex};
 use minimal_surprise_sim::{DamageError, Structure, WorldError};
 use paper::PaperValues;
 use serde::Serialize;
@@ -85,7 +85,7 @@ pub struct Written {
     pub planned: usize,
 }
 
-/// How the runs of a setting were made.
+/// How the runs of a setting were made, the evolved ones or those that were run again.
 #[derive(Clone, Debug, Serialize)]
 pub struct Making {
     /// The experiment.
@@ -100,7 +100,8 @@ pub struct Making {
     pub seeds: String,
     /// Programs that did them.
     pub programs: String,
-    /// SHA-256 of the runs' hashes, in order of their seeds.
+    /// SHA-256 of the runs' hashes, in order of their seeds; of runs that have none, of their
+    /// outcomes.
     pub hash: String,
     /// The command that does them.
     pub command: String,
@@ -210,7 +211,7 @@ pub fn write(
     let mut files = vec![
         ("report.html".to_owned(), html::page(&report)),
         ("report.md".to_owned(), markdown::text(&report)),
-        ("runs.csv".to_owned(), csv_text(&run_rows(&gathered.groups))),
+        ("runs.csv".to_owned(), csv_text(&run_rows(&gathered))),
         ("findings.csv".to_owned(), csv_text(&report.findings)),
         ("how-made.csv".to_owned(), csv_text(&report.making)),
     ];
@@ -252,8 +253,9 @@ impl Report {
             .filter(|group| !group.is_complete())
             .map(|group| format!("{}, {}: {}", group.experiment, group.label, group.counted()));
         let mut seen = BTreeSet::new();
-        let (mut shares_runs, mut time) = (false, gathered.further_time);
-        for run in gathered.groups.iter().flat_map(|group| &group.runs) {
+        let (mut shares_runs, mut time) = (false, TimeSpent::default());
+        let groups = gathered.groups.iter().chain(&gathered.further);
+        for run in groups.clone().flat_map(|group| &group.runs) {
             if seen.insert(&run.id) {
                 time = time.and(run.time);
             } else {
@@ -275,10 +277,9 @@ impl Report {
                 .filter(|v| v.p.is_some())
                 .count(),
             figures: figures::all(gathered, &paper)?,
-            making: gathered
-                .groups
-                .iter()
+            making: groups
                 .map(|group| making(group, called))
+                .chain(made_again(gathered, called))
                 .collect(),
             tables,
         })
@@ -353,18 +354,12 @@ fn p_value(p: f64) -> String {
 }
 
 fn making(group: &Group, called: &str) -> Making {
-    let mut seeds = group.runs.iter().map(|run| run.finished.settings.seed);
     let programs: BTreeSet<&str> = group.runs.iter().map(|run| run.program.as_str()).collect();
     let mut hash = Sha256::new();
     for run in &group.runs {
         hash.update(run.finished.hash.as_bytes());
         hash.update(b"\n");
     }
-    let hash: String = hash
-        .finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
     let times = group.runs.iter().map(|run| run.time);
     let time = times.fold(TimeSpent::default(), TimeSpent::and);
     Making {
@@ -372,16 +367,12 @@ fn making(group: &Group, called: &str) -> Making {
         setting: group.label.clone(),
         finished: group.runs.len(),
         planned: group.planned,
-        seeds: match (seeds.next(), seeds.next_back()) {
-            (Some(first), Some(last)) => format!("{first} to {last}"),
-            (Some(only), None) => only.to_string(),
-            _ => String::new(),
-        },
+        seeds: seeds(&group.runs),
         programs: programs.into_iter().collect::<Vec<_>>().join("; "),
         hash: if group.runs.is_empty() {
             String::new()
         } else {
-            hash
+            hex(hash)
         },
         command: format!("{called} run --only {}", group.experiment),
         cpu_s: time.cpu_s,
@@ -389,9 +380,96 @@ fn making(group: &Group, called: &str) -> Making {
     }
 }
 
-fn run_rows(groups: &[Group]) -> Vec<RunRow<'_>> {
+/// First and last seed, in words.
+fn seeds(runs: &[Run]) -> String {
+    let mut seeds = runs.iter().map(|run| run.finished.settings.seed);
+    match (seeds.next(), seeds.next_back()) {
+        (Some(first), Some(last)) => format!("{first} to {last}"),
+        (Some(only), None) => only.to_string(),
+        _ => String::new(),
+    }
+}
+
+/// How the runs were made that a report itself runs again: from new starts and after damage.
+fn made_again(gathered: &Gathered, called: &str) -> Vec<Making> {
+    let program = format!(
+        "{} {}, revision {}",
+        env!("CARGO_PKG_NAME"),
+        env!("CARGO_PKG_VERSION"),
+        env!("BUILD_REVISION")
+    );
+    let again = |experiment: &str, setting, seeds, (finished, planned), hash: &str| Making {
+        experiment: experiment.to_owned(),
+        setting,
+        finished,
+        planned,
+        seeds,
+        programs: program.clone(),
+        hash: hash.to_owned(),
+        command: format!("{called} report"),
+        cpu_s: 0.0,
+        wall_s: 0.0,
+    };
+    let mut makings = Vec::new();
+    for reevaluated in &gathered.reevaluations {
+        let Some(group) = gathered.group(&reevaluated.experiment, &reevaluated.label) else {
+            continue;
+        };
+        let starts = reevaluated.starts as usize;
+        makings.push(again(
+            &reevaluated.name,
+            format!(
+                "{}: {}, {} of each genome",
+                group.experiment,
+                group.label,
+                plural(starts, "new start")
+            ),
+            seeds(&group.runs),
+            (reevaluated.genomes.len() * starts, group.planned * starts),
+            &reevaluated.hash,
+        ));
+    }
+    for resilient in &gathered.resiliences {
+        let name = &resilient.asked.name;
+        if let Some(damaged) = &resilient.damaged {
+            let runs = damaged.repetitions();
+            makings.push(again(
+                name,
+                format!(
+                    "{}: {}, from new starts and after damage",
+                    resilient.asked.of, damaged.label
+                ),
+                damaged.run.finished.settings.seed.to_string(),
+                (runs, runs),
+                &damaged.hash(),
+            ));
+        }
+        let overall = &resilient.overall;
+        if overall.repetitions > 0 {
+            makings.push(again(
+                name,
+                format!(
+                    "{}: all runs named after the structure ({}), after damage",
+                    resilient.asked.of, resilient.structure
+                ),
+                plural(resilient.named, "run"),
+                (overall.repetitions, overall.repetitions),
+                &overall.hash,
+            ));
+        }
+    }
+    makings
+}
+
+/// So many of something.
+fn plural(number: usize, what: &str) -> String {
+    let s = if number == 1 { "" } else { "s" };
+    format!("{number} {what}{s}")
+}
+
+fn run_rows(gathered: &Gathered) -> Vec<RunRow<'_>> {
     let mut rows = Vec::new();
-    for group in groups {
+    for group in gathered.groups.iter().chain(&gathered.further) {
         for run in &group.runs {
             let names: Vec<&str> = run.names.iter().map(|name| name.name()).collect();
             rows.push(RunRow {
@@ -502,6 +580,9 @@ mod tests {
             !markdown.contains("differs"),
             "there is no paper to differ from"
         );
+        for again in ["| again | two: ", "| damage | two: "] {
+            assert!(markdown.contains(again), "{again} is made, too");
+        }
         let page = std::fs::read_to_string(&written.html).unwrap();
         assert!(page.contains("<svg") && !page.contains("src="));
 

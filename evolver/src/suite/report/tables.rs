@@ -736,7 +736,7 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
              paper's, so that the numbers need not be the same and are not tested.",
             damaged.label, damaged.run.finished.settings.seed
         ));
-        let all = resilient.overall;
+        let all = &resilient.overall;
         if all.areas > 0 {
             notes.push(format!(
                 "All {} runs damaged likewise, {} areas: the share at the end is at least that at \
