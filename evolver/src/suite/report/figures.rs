@@ -5,6 +5,7 @@
 
 use super::gather::{Gathered, Group, Resilient, Run};
 use super::paper::PaperValues;
+use super::plural;
 use super::statistics::quantile;
 use minimal_surprise_sim::structures::{LineOrientation, Structure, classify};
 use minimal_surprise_sim::{Grid, Heading, Pose};
@@ -256,8 +257,8 @@ fn damage(prefix: &str, resilient: &Resilient) -> Result<Option<Figure>, FigureE
         }
     }
     let title = format!(
-        "{prefix}removal of robots from three areas of a {} on {grid}; robots in the structure are \
-         blue",
+        "{prefix}removal of robots from {} of a {} on {grid}; robots in the structure are blue",
+        plural(damaged.areas.len(), "area"),
         resilient.structure
     );
     let id = resilient.asked.name.clone();

@@ -31,7 +31,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use tables::Table;
+use tables::{Table, Value};
 
 /// What people found out about differences, in the report's folder.
 const LOOKED_INTO: &str = "looked-into.md";
@@ -139,8 +139,12 @@ pub struct Report {
     pub has_gallery: bool,
     /// Whether experiments share runs.
     pub shares_runs: bool,
-    /// Tests made in the tables.
+    /// Tests made in the tables that could find a difference, each counted once.
     pub tests: usize,
+    /// Whether there are numbers of the paper beside ours.
+    pub has_paper: bool,
+    /// How the program was called with this suite.
+    pub called: String,
     /// The tables.
     pub tables: Vec<Table>,
     /// The figures.
@@ -262,6 +266,7 @@ impl Report {
                 shares_runs = true;
             }
         }
+        let tests = tests(&tables);
         Ok(Self {
             suite: suite.to_owned(),
             looked_into: Vec::new(),
@@ -270,12 +275,10 @@ impl Report {
             time,
             missing: missing.collect(),
             findings: findings::all(gathered, &paper),
-            differences: differences(&tables),
-            tests: tables
-                .iter()
-                .flat_map(Table::values)
-                .filter(|v| v.p.is_some())
-                .count(),
+            differences: differences(&tests),
+            tests: tests.len(),
+            has_paper: tables.iter().any(|table| has_paper(table)),
+            called: called.to_owned(),
             figures: figures::all(gathered, &paper)?,
             making: groups
                 .map(|group| making(group, called))
@@ -307,32 +310,44 @@ impl Report {
     }
 }
 
-fn differences(tables: &[Table]) -> Vec<String> {
-    let mut words = Vec::new();
+fn has_paper(table: &Table) -> bool {
+    table.values().any(|value| value.paper.is_some())
+}
+
+/// The tests that could find a difference, with their tables; what two tables have counts once.
+fn tests(tables: &[Table]) -> Vec<(&Table, &Value)> {
+    let mut tests: Vec<(&Table, &Value)> = Vec::new();
     for table in tables {
-        for value in table
-            .values()
-            .filter(|value| value.compatible == Some(false))
-        {
-            let source = if table.source.is_empty() {
-                &table.id
-            } else {
-                &table.source
-            };
-            let numbers = match (markdown::ours(value), markdown::theirs(value)) {
-                (Some(ours), Some(paper)) => format!(": {ours}, paper {paper}"),
-                _ => String::new(),
-            };
-            words.push(format!(
-                "{source}, {}, {}{numbers} ({}, {})",
-                value.setting,
-                value.what,
-                value.test.unwrap_or_default(),
-                p_value(value.p.unwrap_or(1.0))
-            ));
+        for value in table.values().filter(|value| value.could_differ()) {
+            if !tests.iter().any(|(_, other)| other.repeats(value)) {
+                tests.push((table, value));
+            }
         }
     }
-    words
+    tests
+}
+
+fn differences(tests: &[(&Table, &Value)]) -> Vec<String> {
+    let different = tests.iter().filter(|(_, v)| v.compatible == Some(false));
+    let words = different.map(|(table, value)| {
+        let source = if table.source.is_empty() {
+            &table.id
+        } else {
+            &table.source
+        };
+        let numbers = match (markdown::ours(value), markdown::theirs(value)) {
+            (Some(ours), Some(paper)) => format!(": {ours}, paper {paper}"),
+            _ => String::new(),
+        };
+        format!(
+            "{source}, {}, {}{numbers} ({}, {})",
+            value.setting,
+            value.what,
+            value.test.unwrap_or_default(),
+            p_value(value.p.unwrap_or(1.0))
+        )
+    });
+    words.collect()
 }
 
 /// A number with so many digits after the point, without a sign if it is zero.
@@ -583,8 +598,22 @@ mod tests {
         for again in ["| again | two: ", "| damage | two: "] {
             assert!(markdown.contains(again), "{again} is made, too");
         }
+        assert!(!markdown.contains("paper's"), "and none to speak of");
+        assert!(markdown.contains("Percentage of new starts"), "{markdown}");
         let page = std::fs::read_to_string(&written.html).unwrap();
         assert!(page.contains("<svg") && !page.contains("src="));
+
+        let makes_one = "suites/own.toml report --gallery";
+        assert!(page.contains(makes_one) && markdown.contains(makes_one));
+        let gallery = scratch.path().join("with-gallery").join(GALLERY);
+        std::fs::create_dir_all(&gallery).unwrap();
+        std::fs::write(gallery.join("index.html"), "a gallery").unwrap();
+        let out_with = gallery.parent().unwrap();
+        let with = write(&plan, &suite, &directory, out_with, called).unwrap();
+        for report in [&with.html, &with.markdown] {
+            let report = std::fs::read_to_string(report).unwrap();
+            assert!(report.contains("gallery/index.html") && !report.contains(makes_one));
+        }
 
         let numbers = ours(&out, "numbers-two.csv");
         let shares = ours(&out, "structures-two.csv");
