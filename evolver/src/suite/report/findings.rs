@@ -137,7 +137,12 @@ fn others(group: &Group, is: impl Fn(&Run) -> bool) -> String {
             run.fitness()
         )
     });
-    words.collect::<Vec<_>>().join("; ")
+    let words: Vec<String> = words.collect();
+    match words.len() {
+        0 => String::new(),
+        1 => format!("Contradicted by {}", words[0]),
+        more => format!("Contradicted by {more} runs: {}", words.join("; ")),
+    }
 }
 
 /// "12 of 20 runs"; what is missing is said too.

@@ -105,7 +105,7 @@ pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
         for finding in report.different_findings() {
             let mut line = format!("- {}: *differs*: {}", finding.claim, finding.ours);
             if !finding.detail.is_empty() {
-                let _ = write!(line, ". {}", finding.detail);
+                let _ = write!(line, ". {}.", finding.detail);
             }
             lines.push(line);
         }

@@ -224,7 +224,7 @@ pub fn write(
         files.push((format!("{}.csv", table.id), csv_text(&values)));
     }
     for figure in &report.figures {
-        files.push((format!("{}.svg", figure.id), figure.svg.clone()));
+        files.push((format!("{}.svg", figure.id), figure.standalone()));
         files.push((format!("{}.csv", figure.id), figure.csv.clone()));
     }
     std::fs::create_dir_all(out).map_err(FileError::at(out))?;
