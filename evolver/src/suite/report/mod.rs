@@ -277,7 +277,7 @@ impl Report {
             findings: findings::all(gathered, &paper),
             differences: differences(&tests),
             tests: tests.len(),
-            has_paper: tables.iter().any(|table| has_paper(table)),
+            has_paper: tables.iter().any(has_paper),
             called: called.to_owned(),
             figures: figures::all(gathered, &paper)?,
             making: groups
