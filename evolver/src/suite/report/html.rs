@@ -333,3 +333,16 @@ fn escape(text: &str) -> String {
         .replace('>', "&gt;")
         .replace('"', "&quot;")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn backticks_are_code_and_stars_stress() {
+        assert_eq!(
+            marked_up("a < b: *differs*, see `run *` and `x`"),
+            "a &lt; b: <em>differs</em>, see <code>run *</code> and <code>x</code>"
+        );
+    }
+}

@@ -552,6 +552,38 @@ mod tests {
         repeat = 4
     ";
 
+    #[test]
+    fn tests_that_cannot_find_a_difference_or_are_repeated_do_not_count() {
+        let value = |of, p| Value {
+            setting: "a setting".to_owned(),
+            what: "a median".to_owned(),
+            of,
+            test: Some(statistics::SIGN_TEST),
+            p: Some(p),
+            compatible: Some(p >= 0.05),
+            ..Value::default()
+        };
+        let table = |values: Vec<Value>| Table {
+            id: "table".to_owned(),
+            source: String::new(),
+            title: String::new(),
+            notes: Vec::new(),
+            columns: Vec::new(),
+            rows: vec![tables::Row {
+                name: String::new(),
+                counted: String::new(),
+                values: values.into_iter().map(Some).collect(),
+            }],
+        };
+        let both = [
+            table(vec![value(5, 0.0625), value(6, 0.03125)]),
+            table(vec![value(6, 0.03125), value(7, 1.0)]),
+        ];
+        let counted: Vec<usize> = tests(&both).iter().map(|(_, value)| value.of).collect();
+        assert_eq!(counted, [6, 7]);
+        assert_eq!(differences(&tests(&both)).len(), 1);
+    }
+
     /// The numbers of a table's CSV by setting and column.
     fn ours(out: &Path, table: &str) -> BTreeMap<(String, String), f64> {
         let mut reader = csv::Reader::from_path(out.join(table)).unwrap();
@@ -595,6 +627,16 @@ mod tests {
             !markdown.contains("differs"),
             "there is no paper to differ from"
         );
+        let files: BTreeSet<_> = written.files.iter().collect();
+        assert_eq!(files.len(), written.files.len(), "no file is written twice");
+        for svg in written
+            .files
+            .iter()
+            .filter(|f| f.extension() == Some("svg".as_ref()))
+        {
+            let svg = std::fs::read_to_string(svg).unwrap();
+            assert!(svg.contains("fill=\"#ffffff\"") && !svg.contains("currentColor"));
+        }
         for again in ["| again | two: ", "| damage | two: "] {
             assert!(markdown.contains(again), "{again} is made, too");
         }

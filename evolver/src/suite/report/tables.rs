@@ -820,19 +820,18 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
         "similarity",
     ];
     let mut notes = vec![format!(
-        "{} of {} of {} looked through {} named after the structure ({}).",
+        "Named after the structure ({}): {} of {} of {}.",
+        resilient.structure,
         resilient.named,
         plural(resilient.looked_through, "run"),
-        resilient.asked.of,
-        if resilient.named == 1 { "is" } else { "are" },
-        resilient.structure
+        resilient.asked.of
     )];
     let mut rows = Vec::new();
     if let Some(damaged) = &resilient.damaged {
         let chosen = match resilient.further {
             0 => "Of these the one with the largest share was damaged".to_owned(),
             further => format!(
-                "So evolution went on, of all settings in turn, and the first that is, run \
+                "So evolution went on, of all settings in turn, and the first named so, run \
                  {further} beyond the plan, was damaged"
             ),
         };
@@ -905,7 +904,8 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
     }
     Table {
         id: if source.is_empty() {
-            name.clone()
+            // The figure has the name itself.
+            format!("numbers-{name}")
         } else {
             file_name(&source)
         },
