@@ -584,6 +584,51 @@ mod tests {
         assert_eq!(differences(&tests(&both)).len(), 1);
     }
 
+    #[test]
+    fn runs_beyond_the_plan_are_listed_as_such() {
+        let text = "
+            name = \"own\"
+            [[experiment]]
+            name = \"one\"
+            runs = 1
+            grids = [\"8x8\"]
+            robots = [12]
+            population = 4
+            generations = 2
+            repetitions = 1
+            steps = 20
+            [[resilience]]
+            name = \"damage\"
+            of = \"one\"
+            structure = \"triangular lattice\"
+            robots-in-areas = [2]
+            repeat = 1
+            further-runs = 2
+        ";
+        let scratch = tempfile::tempdir().unwrap();
+        let suite = Suite::parse(Path::new("own.toml"), text).unwrap();
+        let plan = Plan::new(&suite, None, None, false).unwrap();
+        let further: Vec<_> = plan.experiments[0].further().take(2).collect();
+        for run in plan.runs().into_iter().chain(&further) {
+            let worked = work_on(run, scratch.path(), &AtomicBool::new(false), |_| {});
+            assert_eq!(worked.unwrap(), Worked::Completed);
+        }
+        let out = scratch.path().join("report");
+        let written = write(&plan, &suite, scratch.path(), &out, "evolver").unwrap();
+        assert_eq!((written.finished, written.planned), (1, 1));
+        let runs = std::fs::read_to_string(out.join("runs.csv")).unwrap();
+        let beyond: Vec<&str> = runs
+            .lines()
+            .filter(|l| l.contains("beyond the plan"))
+            .collect();
+        assert_eq!(beyond.len(), 2, "{runs}");
+        for (line, run) in beyond.iter().zip(&further) {
+            assert!(line.contains(&run.id), "{line}");
+        }
+        let made = std::fs::read_to_string(out.join("how-made.csv")).unwrap();
+        assert!(made.contains("beyond the plan\",2,2,2 to 3,"), "{made}");
+    }
+
     /// The numbers of a table's CSV by setting and column.
     fn ours(out: &Path, table: &str) -> BTreeMap<(String, String), f64> {
         let mut reader = csv::Reader::from_path(out.join(table)).unwrap();
