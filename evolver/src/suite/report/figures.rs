@@ -1,18 +1,19 @@
 //! The paper's figures as SVG, each with its data as CSV.
 //!
-//! Lines and letters have the colour of the page's text, so that a figure can be read on a light
-//! and on a dark page.
+//! In the report's page lines and letters have the colour of its text, so that a figure can be read
+//! on a light and on a dark page; a file of its own is dark on white.
 
 use super::gather::{Gathered, Group, Resilient, Run};
 use super::paper::PaperValues;
+use super::plural;
 use super::statistics::quantile;
 use minimal_surprise_sim::structures::{LineOrientation, Structure, classify};
 use minimal_surprise_sim::{Grid, Heading, Pose};
 use plotters::coord::Shift;
 use plotters::element::{Drawable, PointCollection};
 use plotters::prelude::{
-    ChartBuilder, Circle, Color, DrawingArea, IntoDrawingArea, IntoDynElement, PathElement,
-    Polygon, RGBColor, Rectangle, SVGBackend, Text,
+    ChartBuilder, Color, DrawingArea, IntoDrawingArea, IntoDynElement, PathElement, Polygon,
+    RGBColor, Rectangle, SVGBackend, Text,
 };
 use serde::Serialize;
 
@@ -72,6 +73,16 @@ const fn states_of(figure: u32, experiment: &'static str, label: &'static str, b
     }
 }
 
+impl Figure {
+    /// The picture as a file of its own: dark on white, whatever the page that shows it is like.
+    #[must_use]
+    pub fn standalone(&self) -> String {
+        let ground = "><rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>";
+        let on_ground = self.svg.replacen('>', ground, 1);
+        on_ground.replace("currentColor", "#000000")
+    }
+}
+
 /// A figure cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 #[error("figure {id}: {problem}")]
@@ -82,7 +93,6 @@ pub struct FigureError {
 
 const MEMBER: RGBColor = RGBColor(31, 119, 180);
 const OTHER: RGBColor = RGBColor(140, 140, 140);
-const BOX: RGBColor = RGBColor(140, 140, 140);
 const MEDIAN: RGBColor = RGBColor(214, 39, 40);
 const FONT: &str = "sans-serif";
 
@@ -119,17 +129,21 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
         figures.push(temperature(
             name(
                 5,
-                "Temperature over time at even steps; box plots, medians red",
+                "Temperature over time at even steps; medians red, bands of quartiles and extremes grey",
             ),
             &groups,
         )?);
         figures.push(best_fitness(
-            name(6, "Best fitness over generations; box plots, medians red"),
+            name(
+                6,
+                "Best fitness over generations; medians red, bands of quartiles and extremes grey",
+            ),
             &groups,
         )?);
         figures.push(predictions(
             name(9, "Predictions of the robot's surroundings, averaged over robots and steps, a run of each structure; the robot heads up"),
             &groups,
+            gathered,
         )?);
     }
     if is_paper {
@@ -143,8 +157,8 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
                         "Fig. {}: final states on {grid}, {}",
                         of.figure, of.experiment
                     ),
-                    group,
-                    of.by,
+                    (group, of.by),
+                    gathered,
                 )?);
             }
         }
@@ -153,7 +167,7 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
             if !group.runs.is_empty() {
                 let id = format!("{}-states-{}", group.experiment, index + 1);
                 let title = format!("{}, {}: final states", group.experiment, group.label);
-                figures.push(final_states(id, title, group, By::Structure)?);
+                figures.push(final_states(id, title, (group, By::Structure), gathered)?);
             }
         }
     }
@@ -172,6 +186,32 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
         figures.extend(damage(prefix, resilient)?);
     }
     Ok(figures)
+}
+
+/// Marks a run beyond the plan.
+const BEYOND_PLAN: &str = "†";
+
+/// A title that says what the mark means, if it is there.
+fn explained(title: String, has_mark: bool) -> String {
+    if has_mark {
+        format!("{title}; {BEYOND_PLAN} a run beyond the plan")
+    } else {
+        title
+    }
+}
+
+/// The runs beyond the plan under a group's settings that have a structure that none of its own has.
+fn beyond_plan<'a>(gathered: &'a Gathered, group: &Group) -> Vec<(String, Structure, &'a Run)> {
+    let further = gathered.further_of(group);
+    let mut found = further.map_or(Vec::new(), |group| one_of_each(group, By::Structure));
+    found.retain(|(_, structure, _)| {
+        group.runs.iter().all(|run| run.name() != Some(*structure))
+            && gathered
+                .resiliences
+                .iter()
+                .any(|r| r.structure == *structure)
+    });
+    found
 }
 
 /// The run of each structure (or way of lines) with the largest share in it, ties by seed.
@@ -219,17 +259,33 @@ struct State<'a> {
     area: Option<super::damage_areas::Rectangle>,
 }
 
-fn final_states(id: String, title: String, group: &Group, by: By) -> Result<Figure, FigureError> {
-    let states: Vec<State<'_>> = one_of_each(group, by)
+fn final_states(
+    id: String,
+    title: String,
+    (group, by): (&Group, By),
+    gathered: &Gathered,
+) -> Result<Figure, FigureError> {
+    let mut shown: Vec<_> = one_of_each(group, by)
         .into_iter()
-        .map(|(name, structure, run)| State {
-            title: format!("{name} (seed {})", run.finished.settings.seed),
+        .map(|of| ("", of))
+        .collect();
+    let planned = shown.len();
+    if by == By::Structure {
+        let further = beyond_plan(gathered, group).into_iter();
+        shown.extend(further.map(|of| (BEYOND_PLAN, of)));
+    }
+    let has_mark = shown.len() > planned;
+    let states: Vec<State<'_>> = shown
+        .into_iter()
+        .map(|(mark, (name, structure, run))| State {
+            title: format!("{name}{mark} (seed {})", run.finished.settings.seed),
             grid: group.settings.scenario.grid(),
             poses: &run.finished.final_poses,
             structure,
             area: None,
         })
         .collect();
+    let title = explained(title, has_mark);
     let title = format!("{title}; robots in the structure are blue");
     draw_states(id, title, &states, 3)
 }
@@ -256,8 +312,8 @@ fn damage(prefix: &str, resilient: &Resilient) -> Result<Option<Figure>, FigureE
         }
     }
     let title = format!(
-        "{prefix}removal of robots from three areas of a {} on {grid}; robots in the structure are \
-         blue",
+        "{prefix}removal of robots from {} of a {} on {grid}; robots in the structure are blue",
+        plural(damaged.areas.len(), "area"),
         resilient.structure
     );
     let id = resilient.asked.name.clone();
@@ -377,23 +433,30 @@ struct PredictionRow<'a> {
     average_prediction: f64,
 }
 
-fn predictions((id, title): (String, String), groups: &[&Group]) -> Result<Figure, FigureError> {
+fn predictions(
+    (id, title): (String, String),
+    groups: &[&Group],
+    gathered: &Gathered,
+) -> Result<Figure, FigureError> {
     const SIDE: i32 = 40;
     const PANEL: i32 = 250;
-    let shown: Vec<(String, &Group, &Run)> = groups
-        .iter()
-        .flat_map(|group| {
-            one_of_each(group, By::Structure)
-                .into_iter()
-                .map(|(name, _, run)| {
-                    (
-                        format!("{}: {name}", group.settings.written.grid),
-                        *group,
-                        run,
-                    )
-                })
-        })
-        .collect();
+    let shown: Vec<(String, &Group, &Run)> =
+        groups
+            .iter()
+            .flat_map(|group| {
+                let grid = &group.settings.written.grid;
+                let planned = one_of_each(group, By::Structure).into_iter();
+                let further = beyond_plan(gathered, group).into_iter();
+                planned
+                    .map(|(name, _, run)| (format!("{grid}: {name}"), *group, run))
+                    .chain(further.map(|(name, _, run)| {
+                        (format!("{grid}: {name}{BEYOND_PLAN}"), *group, run)
+                    }))
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+    let has_mark = shown.iter().any(|(name, ..)| name.ends_with(BEYOND_PLAN));
+    let title = explained(title, has_mark);
     let mut rows = Vec::new();
     let columns = shown.len().clamp(1, 4) as i32;
     let lines = (shown.len() as i32 + columns - 1) / columns;
@@ -486,7 +549,7 @@ fn temperature((id, title): (String, String), groups: &[&Group]) -> Result<Figur
             }));
         }
     }
-    box_plots(id, title, ("time step", "temperature"), &panels)
+    bands(id, title, ("time step", "temperature"), &panels)
 }
 
 fn best_fitness((id, title): (String, String), groups: &[&Group]) -> Result<Figure, FigureError> {
@@ -502,11 +565,11 @@ fn best_fitness((id, title): (String, String), groups: &[&Group]) -> Result<Figu
             every: 1,
         })
         .collect();
-    box_plots(id, title, ("generation", "best fitness"), &panels)
+    bands(id, title, ("generation", "best fitness"), &panels)
 }
 
 #[derive(Serialize)]
-struct BoxRow<'a> {
+struct BandRow<'a> {
     panel: &'a str,
     at: usize,
     runs: usize,
@@ -517,7 +580,8 @@ struct BoxRow<'a> {
     maximum: f64,
 }
 
-fn box_plots(
+/// Medians with bands from quartile to quartile and from the least to the largest value.
+fn bands(
     id: String,
     title: String,
     (x_name, y_name): (&str, &str),
@@ -564,8 +628,7 @@ fn box_plots(
                 .axis_desc_style((FONT, 13))
                 .draw()
                 .map_err(|error| error.to_string())?;
-            let half = 0.4 * panel.every as f64;
-            let apart = 0.5 * panel.every as f64;
+            let first = rows.len();
             for at in (0..length).step_by(panel.every) {
                 let mut values: Vec<f64> = panel
                     .runs
@@ -573,44 +636,34 @@ fn box_plots(
                     .filter_map(|run| run.get(at).copied())
                     .collect();
                 values.sort_by(f64::total_cmp);
-                let [lower, middle, upper] = [0.25, 0.5, 0.75].map(|q| quantile(&values, q));
-                let reach = 1.5 * (upper - lower);
-                let inside = |value: &&f64| (lower - reach..=upper + reach).contains(*value);
-                let least = values.iter().find(inside).copied().unwrap_or(lower);
-                let most = values.iter().rfind(inside).copied().unwrap_or(upper);
-                let x = at as f64;
-                let mut shapes = vec![
-                    PathElement::new(vec![(x, least), (x, lower)], BOX.stroke_width(1)).into_dyn(),
-                    PathElement::new(vec![(x, upper), (x, most)], BOX.stroke_width(1)).into_dyn(),
-                    Rectangle::new(
-                        [(x - half, lower), (x + half, upper)],
-                        BOX.mix(0.6).filled(),
-                    )
-                    .into_dyn(),
-                    PathElement::new(
-                        vec![(x - apart, middle), (x + apart, middle)],
-                        MEDIAN.stroke_width(2),
-                    )
-                    .into_dyn(),
-                ];
-                let outliers = values.iter().filter(|value| !inside(value));
-                shapes.extend(
-                    outliers.map(|&value| Circle::new((x, value), 1, BOX.filled()).into_dyn()),
-                );
-                chart
-                    .draw_series(shapes)
-                    .map_err(|error| error.to_string())?;
-                rows.push(BoxRow {
+                let [minimum, lower_quartile, median, upper_quartile, maximum] =
+                    [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| quantile(&values, share));
+                rows.push(BandRow {
                     panel: &panel.title,
                     at,
                     runs: values.len(),
-                    minimum: quantile(&values, 0.0),
-                    lower_quartile: lower,
-                    median: middle,
-                    upper_quartile: upper,
-                    maximum: quantile(&values, 1.0),
+                    minimum,
+                    lower_quartile,
+                    median,
+                    upper_quartile,
+                    maximum,
                 });
             }
+            let rows = &rows[first..];
+            let line = |of: fn(&BandRow<'_>) -> f64| rows.iter().map(move |r| (r.at as f64, of(r)));
+            let band = |low, high, share| {
+                let corners: Vec<_> = line(low).chain(line(high).rev()).collect();
+                Polygon::new(corners, OTHER.mix(share).filled()).into_dyn()
+            };
+            let median = line(|row| row.median).collect::<Vec<_>>();
+            let shapes = [
+                band(|row| row.minimum, |row| row.maximum, 0.25),
+                band(|row| row.lower_quartile, |row| row.upper_quartile, 0.5),
+                PathElement::new(median, MEDIAN.stroke_width(2)).into_dyn(),
+            ];
+            chart
+                .draw_series(shapes)
+                .map_err(|error| error.to_string())?;
         }
         Ok(())
     })?;

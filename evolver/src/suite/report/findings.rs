@@ -2,7 +2,8 @@
 
 use super::gather::{Gathered, Group, Resilient, Run, regained};
 use super::paper::{PaperValues, is_grouping};
-use super::statistics::{Test, fisher, mann_whitney, median_interval, sign};
+use super::plural;
+use super::statistics::{RUNS_MIN, Test, fisher, mann_whitney, median_interval, sign};
 use super::tables::MEDIAN_BEST_FITNESS;
 use crate::reevaluation::{mean, median};
 use minimal_surprise_sim::structures::{LineOrientation, Structure};
@@ -11,9 +12,6 @@ use std::collections::BTreeSet;
 
 /// How far a median best fitness may be from the paper's.
 const FITNESS_TOLERANCE: f64 = 0.03;
-/// Fewer runs say nothing about a median, however near they lie: with five, all of them are on one
-/// side of it in every sixteenth case.
-const RUNS_MIN: usize = 6;
 /// Numbers printed with two digits may be this much further apart and still be as far apart as the
 /// tolerance says.
 const PRINTED: f64 = 1e-9;
@@ -24,6 +22,9 @@ const PRINTED: f64 = 1e-9;
 pub enum Verdict {
     /// It is.
     Holds,
+    /// A tendency is, but it may be chance.
+    #[serde(rename = "holds, not significant")]
+    HoldsNotSignificantly,
     /// It is not.
     Differs,
     /// The runs that there are cannot tell.
@@ -37,6 +38,7 @@ impl Verdict {
     pub fn name(self) -> &'static str {
         match self {
             Self::Holds => "holds",
+            Self::HoldsNotSignificantly => "holds, not significant",
             Self::Differs => "differs",
             Self::NotEnoughRuns => "not enough runs",
         }
@@ -50,6 +52,8 @@ pub struct Finding {
     pub claim: String,
     /// What we found.
     pub ours: String,
+    /// The runs that contradict it; of a damaged structure, what became of all runs of it.
+    pub detail: String,
     /// The test, or how it was told.
     pub test: String,
     /// Its p-value, if it has one.
@@ -97,8 +101,10 @@ fn tendency(groups: &[&Group], is_true: bool, test: Test) -> Verdict {
     let complete = groups.iter().all(|group| group.is_complete());
     if groups.iter().any(|group| group.runs.is_empty()) {
         Verdict::NotEnoughRuns
-    } else if is_true && (complete || !test.compatible()) {
+    } else if is_true && !test.compatible() {
         Verdict::Holds
+    } else if is_true && complete {
+        Verdict::HoldsNotSignificantly
     } else if !is_true && !test.compatible() {
         Verdict::Differs
     } else {
@@ -112,6 +118,31 @@ fn count(group: &Group, is: impl Fn(&Run) -> bool) -> u32 {
 
 fn is_named(run: &Run, structures: &[Structure]) -> bool {
     run.name().is_some_and(|name| structures.contains(&name))
+}
+
+/// The runs of which something is not so, in words: what is theirs, and what they formed.
+fn others(group: &Group, is: impl Fn(&Run) -> bool) -> String {
+    let words = group.runs.iter().filter(|run| !is(run)).map(|run| {
+        let mut shares: Vec<_> = Structure::ALL.into_iter().zip(run.shares).collect();
+        shares.retain(|(_, share)| *share > 0.0);
+        shares.sort_by(|(_, one), (_, two)| two.total_cmp(one));
+        let shares = shares
+            .iter()
+            .map(|(structure, share)| format!("{structure} {:.0} %, ", 100.0 * share));
+        format!(
+            "seed {} (`{}`), {}fitness {:.3}",
+            run.finished.settings.seed,
+            run.id,
+            shares.collect::<String>(),
+            run.fitness()
+        )
+    });
+    let words: Vec<String> = words.collect();
+    match words.len() {
+        0 => String::new(),
+        1 => format!("Contradicted by {}", words[0]),
+        more => format!("Contradicted by {more} runs: {}", words.join("; ")),
+    }
 }
 
 /// "12 of 20 runs"; what is missing is said too.
@@ -151,18 +182,18 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
 
 fn model_b(gathered: &Gathered) -> Option<Finding> {
     let [group] = groups(gathered, [("sensor-models", "B, 20x20")])?;
-    let named = count(group, |run| {
-        is_named(run, &[Structure::Line, Structure::Pair])
-    });
-    let others = group.runs.len() as u32 - named;
-    let test = fisher(&[named, others], &[group.planned as u32, 0]);
+    let is = |run: &Run| is_named(run, &[Structure::Line, Structure::Pair]);
+    let named = count(group, is);
+    let number = group.runs.len() as u32 - named;
+    let test = fisher(&[named, number], &[group.planned as u32, 0]);
     Some(
         Finding {
             claim: "Sensor model B on 20 × 20 gives lines and pairs only".into(),
+            detail: others(group, is),
             ours: format!("lines or pairs in {}", of_runs(named, group)),
             test: format!("every run; against the paper {}", test.name),
             p: Some(test.p),
-            verdict: universal(&[group], others == 0),
+            verdict: universal(&[group], number == 0),
         }
         .about(&[group]),
     )
@@ -179,6 +210,7 @@ fn many_structures(gathered: &Gathered) -> Vec<Finding> {
         let enough = names.len() >= 4;
         Some(Finding {
             claim: format!("Sensor model C gives four or more structures on {grid}"),
+            detail: String::new(),
             ours: format!(
                 "{} in {}: {}",
                 names.len(),
@@ -204,6 +236,7 @@ fn most(group: &Group, claim: &str, what: &str, is: impl Fn(&Run) -> bool) -> Fi
     let test = sign(named, others);
     Finding {
         claim: claim.into(),
+        detail: String::new(),
         ours: format!("{what} in {}", of_runs(named, group)),
         test: format!("{} against one half", test.name),
         p: Some(test.p),
@@ -246,18 +279,20 @@ fn predefined(gathered: &Gathered) -> Vec<Finding> {
         return Vec::new();
     };
     let every = |group: &&Group| {
-        let lines = count(group, |run| is_named(run, &[Structure::Line]));
-        let others = group.runs.len() as u32 - lines;
-        let test = fisher(&[lines, others], &[group.planned as u32, 0]);
+        let is = |run: &Run| is_named(run, &[Structure::Line]);
+        let lines = count(group, is);
+        let number = group.runs.len() as u32 - lines;
+        let test = fisher(&[lines, number], &[group.planned as u32, 0]);
         Finding {
             claim: format!(
                 "Predefined lines give lines in every run on {}",
                 group.settings.written.grid
             ),
+            detail: others(group, is),
             ours: format!("lines in {}", of_runs(lines, group)),
             test: format!("every run; against the paper {}", test.name),
             p: Some(test.p),
-            verdict: universal(&[group], others == 0),
+            verdict: universal(&[group], number == 0),
         }
         .about(&[group])
     };
@@ -268,6 +303,7 @@ fn predefined(gathered: &Gathered) -> Vec<Finding> {
         Finding {
             claim: "Predefined lines hold a larger share of the robots on 20 × 20 than on 15 × 15"
                 .into(),
+            detail: String::new(),
             ours: format!(
                 "medians {:.1} % ({}) and {:.1} % ({})",
                 100.0 * median(&shares[1]),
@@ -314,6 +350,7 @@ fn partly_predefined(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
                 "Partly predefining raises the share of line runs on {grid} (paper: by {} points)",
                 raised.points
             ),
+            detail: String::new(),
             ours: format!(
                 "by {:+.0} points, from {:.0} % ({}) to {:.0} % ({})",
                 percent(1) - percent(0),
@@ -341,6 +378,7 @@ fn horizontal(gathered: &Gathered) -> Option<Finding> {
     Some(
         Finding {
             claim: "11 × 18 favours horizontal over vertical lines".into(),
+            detail: String::new(),
             ours: format!(
                 "mostly horizontal in {horizontal}, mostly vertical in {}",
                 of_runs(vertical, group)
@@ -356,12 +394,32 @@ fn horizontal(gathered: &Gathered) -> Option<Finding> {
 /// The runs that were looked through, in words.
 pub(super) fn counted(resilient: &Resilient) -> String {
     match resilient.further {
-        0 => format!("{} runs", resilient.looked_through),
+        0 => plural(resilient.looked_through, "run"),
         further => format!(
-            "{} runs and {further} beyond the plan",
-            resilient.looked_through
+            "{} and {further} beyond the plan",
+            plural(resilient.looked_through, "run")
         ),
     }
+}
+
+/// What became of all planned runs of a structure, in words; none if there are no areas to damage.
+pub(super) fn all_damaged(resilient: &Resilient) -> Option<String> {
+    let all = &resilient.overall;
+    let damaged = match resilient.named {
+        1 => "The one run damaged".to_owned(),
+        more => format!("All {more} runs damaged likewise"),
+    };
+    (all.areas > 0).then(|| {
+        format!(
+            "{damaged}, {}: the share at the end is at least that at the start after removal from \
+             {} (mean change {:+.1} points) and after repositioning from {} ({:+.1} points)",
+            plural(all.areas, "area"),
+            all.removal_holds,
+            100.0 * all.removal_gain,
+            all.repositioning_holds,
+            100.0 * all.repositioning_gain
+        )
+    })
 }
 
 fn resilience(resilient: &Resilient) -> Vec<Finding> {
@@ -374,6 +432,7 @@ fn resilience(resilient: &Resilient) -> Vec<Finding> {
         let Some(damaged) = &resilient.damaged else {
             return Finding {
                 claim,
+                detail: String::new(),
                 ours: format!(
                     "none of {} is named after the structure",
                     counted(resilient)
@@ -414,6 +473,7 @@ fn resilience(resilient: &Resilient) -> Vec<Finding> {
         });
         Finding {
             claim,
+            detail: all_damaged(resilient).unwrap_or_default(),
             ours: words.collect::<Vec<_>>().join(", "),
             test: format!("mean shares of each area; {} of the runs", test.name),
             p: Some(test.p),
@@ -439,16 +499,18 @@ fn noise(gathered: &Gathered) -> Vec<Finding> {
     ) else {
         return Vec::new();
     };
-    let dispersed = count(sparse, |run| is_named(run, &[Structure::RandomDispersion]));
-    let others = sparse.runs.len() as u32 - dispersed;
-    let test = fisher(&[dispersed, others], &[sparse.planned as u32, 0]);
+    let is = |run: &Run| is_named(run, &[Structure::RandomDispersion]);
+    let dispersed = count(sparse, is);
+    let number = sparse.runs.len() as u32 - dispersed;
+    let test = fisher(&[dispersed, number], &[sparse.planned as u32, 0]);
     vec![
         Finding {
             claim: "With 15 % noise 20 × 20 gives dispersion only".into(),
+            detail: others(sparse, is),
             ours: format!("random dispersion in {}", of_runs(dispersed, sparse)),
             test: format!("every run; against the paper {}", test.name),
             p: Some(test.p),
-            verdict: universal(&[sparse], others == 0),
+            verdict: universal(&[sparse], number == 0),
         }
         .about(&[sparse]),
         most(
@@ -480,6 +542,7 @@ fn fitness(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
                 "Median best fitness within {FITNESS_TOLERANCE} of the paper's {} ({}: {}, {})",
                 number.value, group.experiment, group.label, number.source
             ),
+            detail: String::new(),
             ours: interval.map_or_else(
                 || "no runs yet".to_owned(),
                 |i| {

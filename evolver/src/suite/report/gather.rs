@@ -1,12 +1,12 @@
 //! What a report is about: the finished runs of a plan, and what is made of them afterwards.
 
-use super::ReportError;
 use super::damage_areas::{Rectangle, smallest_apart};
+use super::{ReportError, plural};
 use crate::files;
 use crate::finished_run::{FinishedRun, ReadRunError};
 use crate::reevaluation::{ResilienceRow, after_damage, mean, rerun, resilience};
 use crate::settings::Settings;
-use crate::suite::plan::{Plan, PlannedRun, PlannedSettings, label};
+use crate::suite::plan::{Plan, PlannedExperiment, PlannedRun, PlannedSettings, label};
 use crate::suite::search::{Search, look};
 use crate::suite::{Reevaluation, Resilience, Suite};
 use crate::time_spent::TimeSpent;
@@ -15,6 +15,7 @@ use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::structures::{LineCounts, LineOrientation, Structure, classify};
 use minimal_surprise_sim::{Area, Damage, Pose, SeedTree};
 use serde::Deserialize;
+use sha2::{Digest, Sha256};
 use std::path::Path;
 
 /// A finished run and what is known of it.
@@ -100,7 +101,7 @@ impl Group {
     #[must_use]
     pub fn counted(&self) -> String {
         if self.is_complete() {
-            format!("{} runs", self.planned)
+            plural(self.planned, "run")
         } else {
             format!("{} of {} runs", self.runs.len(), self.planned)
         }
@@ -112,9 +113,11 @@ impl Group {
     }
 }
 
-/// Which way the lines of a run go, from each new start, and the structures they are named after.
+/// What a genome formed from a new start: which way its lines go and what it is named after.
 #[derive(Clone, Debug)]
 pub struct NewStart {
+    /// Fitness, 0 to 1.
+    pub fitness: f64,
     /// None without lines.
     pub orientation: Option<LineOrientation>,
     /// Structures.
@@ -134,6 +137,8 @@ pub struct Reevaluated {
     pub label: String,
     /// Of every genome, its new starts.
     pub genomes: Vec<Vec<NewStart>>,
+    /// SHA-256 of all fitnesses and final poses, in order.
+    pub hash: String,
 }
 
 impl Reevaluated {
@@ -181,6 +186,23 @@ pub struct Damaged {
 }
 
 impl Damaged {
+    /// Runs from new starts and after damage.
+    #[must_use]
+    pub fn repetitions(&self) -> usize {
+        let rows = self.rows();
+        rows.iter().skip(1).map(|(_, row)| row.fitness.len()).sum()
+    }
+
+    /// SHA-256 of what became of them, in order.
+    #[must_use]
+    pub fn hash(&self) -> String {
+        let mut hash = Sha256::new();
+        for (_, row) in self.rows() {
+            add_row(&mut hash, row);
+        }
+        hex(hash)
+    }
+
     /// Every row with its name.
     #[must_use]
     pub fn rows(&self) -> Vec<(String, &ResilienceRow)> {
@@ -203,8 +225,12 @@ impl Damaged {
 }
 
 /// What became of all runs of a structure that were damaged as the chosen one was.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overall {
+    /// Runs after damage.
+    pub repetitions: usize,
+    /// SHA-256 of what became of them, in order.
+    pub hash: String,
     /// Areas of all runs.
     pub areas: usize,
     /// Those after whose removal the share at the end was at least that at the start.
@@ -236,17 +262,20 @@ pub struct Resilient {
     pub overall: Overall,
 }
 
+/// What is said of the setting of runs beyond the plan.
+const BEYOND_PLAN: &str = ", beyond the plan";
+
 /// Everything that a report is about.
 #[derive(Clone, Debug)]
 pub struct Gathered {
     /// The evolutions.
     pub groups: Vec<Group>,
+    /// The runs beyond the plan that were looked through for a structure, by settings.
+    pub further: Vec<Group>,
     /// The re-evaluations.
     pub reevaluations: Vec<Reevaluated>,
     /// The resilience experiments.
     pub resiliences: Vec<Resilient>,
-    /// How long the runs took that were done beyond the plan.
-    pub further_time: TimeSpent,
 }
 
 impl Gathered {
@@ -269,27 +298,23 @@ impl Gathered {
             }
         }
         let mut resiliences: Vec<Resilient> = Vec::new();
-        let mut further_time = TimeSpent::default();
         for asked in &suite.resiliences {
-            if let Some(experiment) = plan.experiments.iter().find(|e| e.name == asked.of) {
-                let resilient = damage(asked, &groups, plan, directory)?;
-                // Two searches through the same experiment share its runs.
-                let counted = resiliences.iter().filter(|r| r.asked.of == asked.of);
-                let counted = counted.map(|r| r.further).max().unwrap_or(0);
-                let further = experiment.further().take(resilient.further as usize);
-                for run in further.skip(counted as usize) {
-                    let time = files::read(&run.directory(directory).join("time.json"));
-                    let time = TimeSpent::of_json(&time.unwrap_or_default());
-                    further_time = further_time.and(time);
-                }
-                resiliences.push(resilient);
+            if plan.experiments.iter().any(|e| e.name == asked.of) {
+                resiliences.push(damage(asked, &groups, plan, directory)?);
             }
+        }
+        let mut further = Vec::new();
+        for experiment in &plan.experiments {
+            // Two searches through the same experiment share its runs.
+            let searched = resiliences.iter().filter(|r| r.asked.of == experiment.name);
+            let number = searched.map(|r| r.further).max().unwrap_or(0);
+            further.extend(read_further(experiment, number as usize, directory)?);
         }
         Ok(Self {
             groups,
+            further,
             reevaluations,
             resiliences,
-            further_time,
         })
     }
 
@@ -299,6 +324,15 @@ impl Gathered {
         self.groups
             .iter()
             .find(|group| group.experiment == experiment && group.label == label)
+    }
+
+    /// The runs beyond the plan under the same settings as those of a group, if there are any.
+    #[must_use]
+    pub fn further_of(&self, group: &Group) -> Option<&Group> {
+        self.further.iter().find(|further| {
+            further.experiment == group.experiment
+                && further.label.strip_suffix(BEYOND_PLAN) == Some(&group.label)
+        })
     }
 
     /// Names of the experiments, in order.
@@ -351,6 +385,35 @@ fn read_group(
     }))
 }
 
+/// The first so many runs beyond the plan of an experiment, by settings.
+fn read_further(
+    experiment: &PlannedExperiment,
+    number: usize,
+    directory: &Path,
+) -> Result<Vec<Group>, ReportError> {
+    let mut groups: Vec<Group> = Vec::new();
+    for planned in experiment.further().take(number) {
+        let Some(run) = read_run(&planned, &planned.directory(directory))? else {
+            continue;
+        };
+        let label = label(&planned.settings) + BEYOND_PLAN;
+        match groups.iter_mut().find(|group| group.label == label) {
+            Some(group) => {
+                group.planned += 1;
+                group.runs.push(run);
+            }
+            None => groups.push(Group {
+                experiment: experiment.name.clone(),
+                label,
+                settings: planned.settings.clone(),
+                planned: 1,
+                runs: vec![run],
+            }),
+        }
+    }
+    Ok(groups)
+}
+
 /// A run; none if it is not finished.
 fn read_run(planned: &PlannedRun, directory: &Path) -> Result<Option<Run>, ReportError> {
     let finished = match FinishedRun::read(directory) {
@@ -391,6 +454,7 @@ fn json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, ReportError> {
 
 fn reevaluate(asked: &Reevaluation, group: &Group) -> Result<Reevaluated, ReportError> {
     let mut genomes = Vec::new();
+    let mut hash = Sha256::new();
     for run in &group.runs {
         let settings = &run.finished.settings;
         let seeds = SeedTree::new(settings.seed);
@@ -400,7 +464,12 @@ fn reevaluate(asked: &Reevaluation, group: &Group) -> Result<Reevaluated, Report
             seeds,
             asked.starts,
         )?;
+        for rerun in &reruns {
+            hash.update(rerun.fitness.to_bits().to_le_bytes());
+            add_poses(&mut hash, &rerun.final_poses);
+        }
         let starts = reruns.into_iter().map(|rerun| NewStart {
+            fitness: rerun.fitness,
             orientation: rerun.orientation,
             names: rerun.names,
         });
@@ -412,7 +481,35 @@ fn reevaluate(asked: &Reevaluation, group: &Group) -> Result<Reevaluated, Report
         experiment: group.experiment.clone(),
         label: group.label.clone(),
         genomes,
+        hash: hex(hash),
     })
+}
+
+fn add_poses(hash: &mut Sha256, poses: &[Pose]) {
+    for pose in poses {
+        hash.update(pose.x.to_le_bytes());
+        hash.update(pose.y.to_le_bytes());
+        hash.update([u8::from(pose.heading)]);
+    }
+}
+
+fn add_row(hash: &mut Sha256, row: &ResilienceRow) {
+    let columns = [
+        &row.robots,
+        &row.fitness,
+        &row.share_start,
+        &row.share_end,
+        &row.similarity,
+    ];
+    for value in columns.into_iter().flatten() {
+        hash.update(value.to_bits().to_le_bytes());
+    }
+}
+
+/// A hash in hexadecimal digits.
+pub(super) fn hex(hash: Sha256) -> String {
+    let bytes = hash.finalize();
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A structure by its name in files.
@@ -483,14 +580,17 @@ fn overall<'a>(
     runs: impl Iterator<Item = &'a Run>,
 ) -> Result<Overall, ReportError> {
     let mut all = Overall::default();
+    let mut hash = Sha256::new();
     for run in runs {
         let finished = &run.finished;
         let grid = finished.settings.scenario.grid();
         let found = smallest_apart(grid, &finished.final_poses, &asked.robots_in_areas);
         for Rectangle { x0, y0, x1, y1 } in found.into_iter().flatten() {
             let area = Area::new(grid, x0, y0, x1, y1)?;
-            let gain = |damage| {
+            let mut gain = |damage| {
                 let row = after_damage(finished, structure, damage, asked.repeat)?;
+                all.repetitions += row.fitness.len();
+                add_row(&mut hash, &row);
                 Ok::<_, ReportError>(regained(&row))
             };
             let removal = gain(Damage::Remove(area))?;
@@ -505,6 +605,7 @@ fn overall<'a>(
     let areas = all.areas.max(1) as f64;
     all.removal_gain /= areas;
     all.repositioning_gain /= areas;
+    all.hash = hex(hash);
     Ok(all)
 }
 

@@ -3,7 +3,7 @@
 use super::findings::Verdict;
 use super::markdown::{interval, ours, sentence, theirs, verdict};
 use super::tables::{Table, Value};
-use super::{Report, p_value};
+use super::{Report, p_value, plural};
 use std::fmt::Write;
 
 const STYLE: &str = "
@@ -25,6 +25,19 @@ svg { max-width: 100%; height: auto; } code { font-size: .9em; overflow-wrap: an
 /// What says that a page is a report of this program.
 pub(super) const MARK: &str = "<meta name=\"generator\" content=\"minimal-surprise-evolver\">";
 
+/// Said before the findings.
+pub(super) const VERDICTS: &str = "*Holds* and *differs* say whether the statement, as worded, is \
+                                   true of our runs. The p-value stands beside it and only tells \
+                                   whether a tendency may be chance: one that is seen with p ≥ 0.05 \
+                                   is called *not significant*, and one that is not seen differs \
+                                   only with p < 0.05.";
+
+/// How to read a table's numbers.
+pub(super) fn reading(report: &Report, ours: &str, paper: &str) -> String {
+    let paper = if report.has_paper { paper } else { "" };
+    format!("{ours}{paper}.")
+}
+
 /// Said where experiments share runs.
 pub(super) const SHARED: &str = "Experiments that ask for the same settings and seeds share their \
                                  runs; what is said of them is not independent.";
@@ -41,13 +54,17 @@ pub fn page(report: &Report) -> String {
     );
     if report.has_gallery {
         page += "<p><a href=\"gallery/index.html\">Look at every run</a>: its final state and its replay.</p>\n";
+    } else {
+        let _ = writeln!(page, "<p>{}</p>", marked_up(&to_look_at(report)));
     }
     for (heading, paragraphs) in opening(report) {
         let _ = writeln!(page, "<h2>{}</h2>", escape(heading));
         write_paragraphs(&mut page, &paragraphs);
     }
     write_findings(&mut page, report);
-    page += "<h2>Tables</h2>\n<p>Ours in bold, below it the 95 % interval and the paper's number.</p>\n";
+    let ours = "Ours in bold, below it the 95 % interval";
+    let reading = reading(report, ours, " and the paper's number");
+    let _ = writeln!(page, "<h2>Tables</h2>\n<p>{reading}</p>");
     for table in &report.tables {
         write_table(&mut page, table);
     }
@@ -67,6 +84,14 @@ pub fn page(report: &Report) -> String {
     page
 }
 
+/// How every run can be looked at, where there is no gallery.
+pub(super) fn to_look_at(report: &Report) -> String {
+    format!(
+        "A gallery of every run, its final state and its replay, is made by `{} report --gallery`.",
+        report.called
+    )
+}
+
 /// What comes first: what is missing, and where we differ.
 pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
     let mut opening = Vec::new();
@@ -81,7 +106,11 @@ pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
     if report.tests > 0 || !report.findings.is_empty() {
         let mut lines = Vec::new();
         for finding in report.different_findings() {
-            lines.push(format!("- {}: *differs*: {}", finding.claim, finding.ours));
+            let mut line = format!("- {}: *differs*: {}", finding.claim, finding.ours);
+            if !finding.detail.is_empty() {
+                let _ = write!(line, ". {}.", finding.detail);
+            }
+            lines.push(line);
         }
         if lines.is_empty() {
             lines.push(
@@ -95,12 +124,17 @@ pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
         }
         lines.push(String::new());
         lines.push(format!(
-            "Of {} tests of our numbers against the paper's, {} have p < {}; by chance alone about \
-             {:.0} would.\n",
-            report.tests,
-            report.differences.len(),
+            "Of {} of our numbers against the paper's, {} p < {}; by chance alone at most about \
+             {:.0} would. Sign tests of fewer than {} runs, which cannot, are not counted, and what \
+             two tables have is counted once.\n",
+            plural(report.tests, "test"),
+            match report.differences.len() {
+                1 => "1 has".to_owned(),
+                more => format!("{more} have"),
+            },
             super::statistics::SIGNIFICANT,
-            super::statistics::SIGNIFICANT * report.tests as f64
+            super::statistics::SIGNIFICANT * report.tests as f64,
+            super::statistics::RUNS_MIN
         ));
         lines.extend(report.differences.iter().map(|line| format!("- {line}")));
         opening.push(("Where we differ", lines));
@@ -134,18 +168,14 @@ fn write_paragraphs(page: &mut String, lines: &[String]) {
                     page.push_str("<ul>\n");
                 }
                 in_list = true;
-                let _ = writeln!(
-                    page,
-                    "<li>{}</li>",
-                    escape(item).replace("*differs*", "<em>differs</em>")
-                );
+                let _ = writeln!(page, "<li>{}</li>", marked_up(item));
             }
             None => {
                 if in_list {
                     page.push_str("</ul>\n");
                 }
                 in_list = false;
-                let _ = writeln!(page, "<p>{}</p>", escape(line));
+                let _ = writeln!(page, "<p>{}</p>", marked_up(line));
             }
         }
     }
@@ -158,13 +188,18 @@ fn write_findings(page: &mut String, report: &Report) {
     if report.findings.is_empty() {
         return;
     }
+    let _ = writeln!(
+        page,
+        "<h2>Main findings</h2>\n<p>{}</p>",
+        marked_up(VERDICTS)
+    );
     page.push_str(
-        "<h2>Main findings</h2>\n<div class=\"wide\"><table><thead><tr><th>the paper's finding</th>\
+        "<div class=\"wide\"><table><thead><tr><th>the paper's finding</th>\
          <th>ours</th><th>test</th><th>verdict</th></tr></thead><tbody>\n",
     );
     for finding in &report.findings {
         let class = match finding.verdict {
-            Verdict::Holds => "good",
+            Verdict::Holds | Verdict::HoldsNotSignificantly => "good",
             Verdict::Differs => "bad",
             Verdict::NotEnoughRuns => "open",
         };
@@ -249,7 +284,7 @@ fn cell(value: &Value) -> String {
 fn write_making(page: &mut String, report: &Report) {
     page.push_str(
         "<h2>How it was made</h2>\n<div class=\"wide\"><table><thead><tr><th>runs</th><th>seeds</th>\
-         <th>minutes, CPU / clock</th><th>command and program</th><th>hash of the runs' hashes</th></tr></thead><tbody>\n",
+         <th>minutes, CPU / clock</th><th>command and program</th><th>SHA-256 of the outcomes</th></tr></thead><tbody>\n",
     );
     for making in &report.making {
         let _ = writeln!(
@@ -277,9 +312,40 @@ fn write_making(page: &mut String, report: &Report) {
     page.push_str("<p>Every run with its seed and hash: <a href=\"runs.csv\">runs.csv</a>.</p>\n");
 }
 
+/// Text with what is between backticks as code and what is between single stars stressed.
+fn marked_up(text: &str) -> String {
+    let mut marked = String::new();
+    for (place, part) in escape(text).split('`').enumerate() {
+        if place % 2 == 1 {
+            let _ = write!(marked, "<code>{part}</code>");
+            continue;
+        }
+        for (place, part) in part.split('*').enumerate() {
+            match place % 2 {
+                1 => drop(write!(marked, "<em>{part}</em>")),
+                _ => marked.push_str(part),
+            }
+        }
+    }
+    marked
+}
+
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
         .replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn backticks_are_code_and_stars_stress() {
+        assert_eq!(
+            marked_up("a < b: *differs*, see `run *` and `x`"),
+            "a &lt; b: <em>differs</em>, see <code>run *</code> and <code>x</code>"
+        );
+    }
 }

@@ -15,7 +15,8 @@ pub fn text(report: &Report) -> String {
         }
     }
     if !report.findings.is_empty() {
-        text += "\n## Main findings\n\n| the paper's finding | ours | test | p | verdict |\n|---|---|---|---|---|\n";
+        let _ = writeln!(text, "\n## Main findings\n\n{}\n", super::html::VERDICTS);
+        text += "| the paper's finding | ours | test | p | verdict |\n|---|---|---|---|---|\n";
         for finding in &report.findings {
             let _ = writeln!(
                 text,
@@ -28,7 +29,8 @@ pub fn text(report: &Report) -> String {
             );
         }
     }
-    text += "\n## Tables\n\nOurs [95 % interval] · paper's.\n";
+    let reading = super::html::reading(report, "Ours [95 % interval]", " · paper's");
+    let _ = writeln!(text, "\n## Tables\n\n{reading}");
     for table in &report.tables {
         write_table(&mut text, table);
     }
@@ -44,7 +46,7 @@ pub fn text(report: &Report) -> String {
             figure.id
         );
     }
-    text += "\n## How it was made\n\n| experiment | setting | runs | seeds | minutes, CPU / clock | command | program | hash of the runs' hashes |\n|---|---|---|---|---|---|---|---|\n";
+    text += "\n## How it was made\n\n| experiment | setting | runs | seeds | minutes, CPU / clock | command | program | SHA-256 of the outcomes |\n|---|---|---|---|---|---|---|---|\n";
     for making in &report.making {
         let _ = writeln!(
             text,
@@ -69,6 +71,8 @@ pub fn text(report: &Report) -> String {
     text += "\nEvery run with its seed and hash: [runs.csv](runs.csv).\n";
     if report.has_gallery {
         let _ = writeln!(text, "Every run to look at: [gallery](gallery/index.html).");
+    } else {
+        let _ = writeln!(text, "\n{}", super::html::to_look_at(report));
     }
     text
 }

@@ -23,7 +23,7 @@ use crate::report::progress::seconds;
 use crate::time_spent::TimeSpent;
 use figures::{Figure, FigureError};
 use findings::{Finding, Verdict};
-use gather::{Gathered, Group};
+use gather::{Gathered, Group, Run, hex};
 use minimal_surprise_sim::{DamageError, Structure, WorldError};
 use paper::PaperValues;
 use serde::Serialize;
@@ -31,7 +31,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use tables::Table;
+use tables::{Table, Value};
 
 /// What people found out about differences, in the report's folder.
 const LOOKED_INTO: &str = "looked-into.md";
@@ -85,7 +85,7 @@ pub struct Written {
     pub planned: usize,
 }
 
-/// How the runs of a setting were made.
+/// How the runs of a setting were made, the evolved ones or those that were run again.
 #[derive(Clone, Debug, Serialize)]
 pub struct Making {
     /// The experiment.
@@ -100,7 +100,8 @@ pub struct Making {
     pub seeds: String,
     /// Programs that did them.
     pub programs: String,
-    /// SHA-256 of the runs' hashes, in order of their seeds.
+    /// SHA-256 of the runs' hashes, in order of their seeds; of runs that have none, of their
+    /// outcomes.
     pub hash: String,
     /// The command that does them.
     pub command: String,
@@ -138,8 +139,12 @@ pub struct Report {
     pub has_gallery: bool,
     /// Whether experiments share runs.
     pub shares_runs: bool,
-    /// Tests made in the tables.
+    /// Tests made in the tables that could find a difference, each counted once.
     pub tests: usize,
+    /// Whether there are numbers of the paper beside ours.
+    pub has_paper: bool,
+    /// How the program was called with this suite.
+    pub called: String,
     /// The tables.
     pub tables: Vec<Table>,
     /// The figures.
@@ -225,7 +230,7 @@ pub fn write(
     let mut files = vec![
         ("report.html".to_owned(), html::page(&report)),
         ("report.md".to_owned(), markdown::text(&report)),
-        ("runs.csv".to_owned(), csv_text(&run_rows(&gathered.groups))),
+        ("runs.csv".to_owned(), csv_text(&run_rows(&gathered))),
         ("findings.csv".to_owned(), csv_text(&report.findings)),
         ("how-made.csv".to_owned(), csv_text(&report.making)),
     ];
@@ -234,7 +239,7 @@ pub fn write(
         files.push((format!("{}.csv", table.id), csv_text(&values)));
     }
     for figure in &report.figures {
-        files.push((format!("{}.svg", figure.id), figure.svg.clone()));
+        files.push((format!("{}.svg", figure.id), figure.standalone()));
         files.push((format!("{}.csv", figure.id), figure.csv.clone()));
     }
     std::fs::create_dir_all(out).map_err(FileError::at(out))?;
@@ -267,14 +272,16 @@ impl Report {
             .filter(|group| !group.is_complete())
             .map(|group| format!("{}, {}: {}", group.experiment, group.label, group.counted()));
         let mut seen = BTreeSet::new();
-        let (mut shares_runs, mut time) = (false, gathered.further_time);
-        for run in gathered.groups.iter().flat_map(|group| &group.runs) {
+        let (mut shares_runs, mut time) = (false, TimeSpent::default());
+        let groups = gathered.groups.iter().chain(&gathered.further);
+        for run in groups.clone().flat_map(|group| &group.runs) {
             if seen.insert(&run.id) {
                 time = time.and(run.time);
             } else {
                 shares_runs = true;
             }
         }
+        let tests = tests(&tables);
         Ok(Self {
             suite: suite.to_owned(),
             looked_into: Vec::new(),
@@ -283,17 +290,14 @@ impl Report {
             time,
             missing: missing.collect(),
             findings: findings::all(gathered, &paper),
-            differences: differences(&tables),
-            tests: tables
-                .iter()
-                .flat_map(Table::values)
-                .filter(|v| v.p.is_some())
-                .count(),
+            differences: differences(&tests),
+            tests: tests.len(),
+            has_paper: tables.iter().any(has_paper),
+            called: called.to_owned(),
             figures: figures::all(gathered, &paper)?,
-            making: gathered
-                .groups
-                .iter()
+            making: groups
                 .map(|group| making(group, called))
+                .chain(made_again(gathered, called))
                 .collect(),
             tables,
         })
@@ -321,32 +325,44 @@ impl Report {
     }
 }
 
-fn differences(tables: &[Table]) -> Vec<String> {
-    let mut words = Vec::new();
+fn has_paper(table: &Table) -> bool {
+    table.values().any(|value| value.paper.is_some())
+}
+
+/// The tests that could find a difference, with their tables; what two tables have counts once.
+fn tests(tables: &[Table]) -> Vec<(&Table, &Value)> {
+    let mut tests: Vec<(&Table, &Value)> = Vec::new();
     for table in tables {
-        for value in table
-            .values()
-            .filter(|value| value.compatible == Some(false))
-        {
-            let source = if table.source.is_empty() {
-                &table.id
-            } else {
-                &table.source
-            };
-            let numbers = match (markdown::ours(value), markdown::theirs(value)) {
-                (Some(ours), Some(paper)) => format!(": {ours}, paper {paper}"),
-                _ => String::new(),
-            };
-            words.push(format!(
-                "{source}, {}, {}{numbers} ({}, {})",
-                value.setting,
-                value.what,
-                value.test.unwrap_or_default(),
-                p_value(value.p.unwrap_or(1.0))
-            ));
+        for value in table.values().filter(|value| value.could_differ()) {
+            if !tests.iter().any(|(_, other)| other.repeats(value)) {
+                tests.push((table, value));
+            }
         }
     }
-    words
+    tests
+}
+
+fn differences(tests: &[(&Table, &Value)]) -> Vec<String> {
+    let different = tests.iter().filter(|(_, v)| v.compatible == Some(false));
+    let words = different.map(|(table, value)| {
+        let source = if table.source.is_empty() {
+            &table.id
+        } else {
+            &table.source
+        };
+        let numbers = match (markdown::ours(value), markdown::theirs(value)) {
+            (Some(ours), Some(paper)) => format!(": {ours}, paper {paper}"),
+            _ => String::new(),
+        };
+        format!(
+            "{source}, {}, {}{numbers} ({}, {})",
+            value.setting,
+            value.what,
+            value.test.unwrap_or_default(),
+            p_value(value.p.unwrap_or(1.0))
+        )
+    });
+    words.collect()
 }
 
 /// A number with so many digits after the point, without a sign if it is zero.
@@ -368,18 +384,12 @@ fn p_value(p: f64) -> String {
 }
 
 fn making(group: &Group, called: &str) -> Making {
-    let mut seeds = group.runs.iter().map(|run| run.finished.settings.seed);
     let programs: BTreeSet<&str> = group.runs.iter().map(|run| run.program.as_str()).collect();
     let mut hash = Sha256::new();
     for run in &group.runs {
         hash.update(run.finished.hash.as_bytes());
         hash.update(b"\n");
     }
-    let hash: String = hash
-        .finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
     let times = group.runs.iter().map(|run| run.time);
     let time = times.fold(TimeSpent::default(), TimeSpent::and);
     Making {
@@ -387,16 +397,12 @@ fn making(group: &Group, called: &str) -> Making {
         setting: group.label.clone(),
         finished: group.runs.len(),
         planned: group.planned,
-        seeds: match (seeds.next(), seeds.next_back()) {
-            (Some(first), Some(last)) => format!("{first} to {last}"),
-            (Some(only), None) => only.to_string(),
-            _ => String::new(),
-        },
+        seeds: seeds(&group.runs),
         programs: programs.into_iter().collect::<Vec<_>>().join("; "),
         hash: if group.runs.is_empty() {
             String::new()
         } else {
-            hash
+            hex(hash)
         },
         command: format!("{called} run --only {}", group.experiment),
         cpu_s: time.cpu_s,
@@ -404,9 +410,96 @@ fn making(group: &Group, called: &str) -> Making {
     }
 }
 
-fn run_rows(groups: &[Group]) -> Vec<RunRow<'_>> {
+/// First and last seed, in words.
+fn seeds(runs: &[Run]) -> String {
+    let mut seeds = runs.iter().map(|run| run.finished.settings.seed);
+    match (seeds.next(), seeds.next_back()) {
+        (Some(first), Some(last)) => format!("{first} to {last}"),
+        (Some(only), None) => only.to_string(),
+        _ => String::new(),
+    }
+}
+
+/// How the runs were made that a report itself runs again: from new starts and after damage.
+fn made_again(gathered: &Gathered, called: &str) -> Vec<Making> {
+    let program = format!(
+        "{} {}, revision {}",
+        env!("CARGO_PKG_NAME"),
+        env!("CARGO_PKG_VERSION"),
+        env!("BUILD_REVISION")
+    );
+    let again = |experiment: &str, setting, seeds, (finished, planned), hash: &str| Making {
+        experiment: experiment.to_owned(),
+        setting,
+        finished,
+        planned,
+        seeds,
+        programs: program.clone(),
+        hash: hash.to_owned(),
+        command: format!("{called} report"),
+        cpu_s: 0.0,
+        wall_s: 0.0,
+    };
+    let mut makings = Vec::new();
+    for reevaluated in &gathered.reevaluations {
+        let Some(group) = gathered.group(&reevaluated.experiment, &reevaluated.label) else {
+            continue;
+        };
+        let starts = reevaluated.starts as usize;
+        makings.push(again(
+            &reevaluated.name,
+            format!(
+                "{}: {}, {} of each genome",
+                group.experiment,
+                group.label,
+                plural(starts, "new start")
+            ),
+            seeds(&group.runs),
+            (reevaluated.genomes.len() * starts, group.planned * starts),
+            &reevaluated.hash,
+        ));
+    }
+    for resilient in &gathered.resiliences {
+        let name = &resilient.asked.name;
+        if let Some(damaged) = &resilient.damaged {
+            let runs = damaged.repetitions();
+            makings.push(again(
+                name,
+                format!(
+                    "{}: {}, from new starts and after damage",
+                    resilient.asked.of, damaged.label
+                ),
+                damaged.run.finished.settings.seed.to_string(),
+                (runs, runs),
+                &damaged.hash(),
+            ));
+        }
+        let overall = &resilient.overall;
+        if overall.repetitions > 0 {
+            makings.push(again(
+                name,
+                format!(
+                    "{}: all runs named after the structure ({}), after damage",
+                    resilient.asked.of, resilient.structure
+                ),
+                plural(resilient.named, "run"),
+                (overall.repetitions, overall.repetitions),
+                &overall.hash,
+            ));
+        }
+    }
+    makings
+}
+
+/// So many of something.
+fn plural(number: usize, what: &str) -> String {
+    let s = if number == 1 { "" } else { "s" };
+    format!("{number} {what}{s}")
+}
+
+fn run_rows(gathered: &Gathered) -> Vec<RunRow<'_>> {
     let mut rows = Vec::new();
-    for group in groups {
+    for group in gathered.groups.iter().chain(&gathered.further) {
         for run in &group.runs {
             let names: Vec<&str> = run.names.iter().map(|name| name.name()).collect();
             rows.push(RunRow {
@@ -474,6 +567,83 @@ mod tests {
         repeat = 4
     ";
 
+    #[test]
+    fn tests_that_cannot_find_a_difference_or_are_repeated_do_not_count() {
+        let value = |of, p| Value {
+            setting: "a setting".to_owned(),
+            what: "a median".to_owned(),
+            of,
+            test: Some(statistics::SIGN_TEST),
+            p: Some(p),
+            compatible: Some(p >= 0.05),
+            ..Value::default()
+        };
+        let table = |values: Vec<Value>| Table {
+            id: "table".to_owned(),
+            source: String::new(),
+            title: String::new(),
+            notes: Vec::new(),
+            columns: Vec::new(),
+            rows: vec![tables::Row {
+                name: String::new(),
+                counted: String::new(),
+                values: values.into_iter().map(Some).collect(),
+            }],
+        };
+        let both = [
+            table(vec![value(5, 0.0625), value(6, 0.03125)]),
+            table(vec![value(6, 0.03125), value(7, 1.0)]),
+        ];
+        let counted: Vec<usize> = tests(&both).iter().map(|(_, value)| value.of).collect();
+        assert_eq!(counted, [6, 7]);
+        assert_eq!(differences(&tests(&both)).len(), 1);
+    }
+
+    #[test]
+    fn runs_beyond_the_plan_are_listed_as_such() {
+        let text = "
+            name = \"own\"
+            [[experiment]]
+            name = \"one\"
+            runs = 1
+            grids = [\"8x8\"]
+            robots = [12]
+            population = 4
+            generations = 2
+            repetitions = 1
+            steps = 20
+            [[resilience]]
+            name = \"damage\"
+            of = \"one\"
+            structure = \"triangular lattice\"
+            robots-in-areas = [2]
+            repeat = 1
+            further-runs = 2
+        ";
+        let scratch = tempfile::tempdir().unwrap();
+        let suite = Suite::parse(Path::new("own.toml"), text).unwrap();
+        let plan = Plan::new(&suite, None, None, false).unwrap();
+        let further: Vec<_> = plan.experiments[0].further().take(2).collect();
+        for run in plan.runs().into_iter().chain(&further) {
+            let worked = work_on(run, scratch.path(), &AtomicBool::new(false), |_| {});
+            assert_eq!(worked.unwrap(), Worked::Completed);
+        }
+        let out = scratch.path().join("report");
+        let written = write(&plan, &suite, scratch.path(), &out, "evolver").unwrap();
+        assert_eq!((written.finished, written.planned), (1, 1));
+        let runs = std::fs::read_to_string(out.join("runs.csv")).unwrap();
+        let beyond: Vec<&str> = runs
+            .lines()
+            .filter(|l| l.contains("beyond the plan"))
+            .collect();
+        assert_eq!(beyond.len(), 2, "{runs}");
+        for (line, run) in beyond.iter().zip(&further) {
+            assert!(line.contains(&run.id), "{line}");
+        }
+        let made = std::fs::read_to_string(out.join("how-made.csv")).unwrap();
+        assert!(made.contains("beyond the plan\",2,2,2 to 3,"), "{made}");
+    }
+
     /// The numbers of a table's CSV by setting and column.
     fn ours(out: &Path, table: &str) -> BTreeMap<(String, String), f64> {
         let mut reader = csv::Reader::from_path(out.join(table)).unwrap();
@@ -517,8 +687,35 @@ mod tests {
             !markdown.contains("differs"),
             "there is no paper to differ from"
         );
+        let files: BTreeSet<_> = written.files.iter().collect();
+        assert_eq!(files.len(), written.files.len(), "no file is written twice");
+        for svg in written
+            .files
+            .iter()
+            .filter(|f| f.extension() == Some("svg".as_ref()))
+        {
+            let svg = std::fs::read_to_string(svg).unwrap();
+            assert!(svg.contains("fill=\"#ffffff\"") && !svg.contains("currentColor"));
+        }
+        for again in ["| again | two: ", "| damage | two: "] {
+            assert!(markdown.contains(again), "{again} is made, too");
+        }
+        assert!(!markdown.contains("paper's"), "and none to speak of");
+        assert!(markdown.contains("Percentage of new starts"), "{markdown}");
         let page = std::fs::read_to_string(&written.html).unwrap();
         assert!(page.contains("<svg") && !page.contains("src="));
+
+        let makes_one = "suites/own.toml report --gallery";
+        assert!(page.contains(makes_one) && markdown.contains(makes_one));
+        let gallery = scratch.path().join("with-gallery").join(GALLERY);
+        std::fs::create_dir_all(&gallery).unwrap();
+        std::fs::write(gallery.join("index.html"), "a gallery").unwrap();
+        let out_with = gallery.parent().unwrap();
+        let with = write(&plan, &suite, &directory, out_with, called).unwrap();
+        for report in [&with.html, &with.markdown] {
+            let report = std::fs::read_to_string(report).unwrap();
+            assert!(report.contains("gallery/index.html") && !report.contains(makes_one));
+        }
 
         let numbers = ours(&out, "numbers-two.csv");
         let shares = ours(&out, "structures-two.csv");

@@ -208,6 +208,9 @@ impl PaperValues {
     }
 }
 
+/// The grid of the damaged structures in Tables 7 and 8.
+pub const DAMAGED_GRID: &str = "15x15";
+
 /// The three groupings together.
 pub const GROUPING: &str = "grouping";
 

@@ -1,11 +1,15 @@
 //! The paper's tables with our numbers, the paper's, intervals and tests.
 
-use super::findings::counted;
-use super::gather::{Gathered, Group, Reevaluated, Resilient, Run, structure_named};
+use super::findings::{all_damaged, counted};
+use super::gather::{Gathered, Group, NewStart, Reevaluated, Resilient, Run, structure_named};
 use super::paper::{
-    Distribution, GROUPING, MeanMedian, NONE, Of, PaperValues, StructureValues, is_grouping,
+    DAMAGED_GRID, Distribution, GROUPING, MeanMedian, NONE, Of, PaperValues, StructureValues,
+    is_grouping,
 };
-use super::statistics::{Interval, Test, fisher, median_interval, median_is, wilson};
+use super::plural;
+use super::statistics::{
+    Interval, RUNS_MIN, SIGN_TEST, Test, fisher, median_interval, median_is, wilson,
+};
 use crate::reevaluation::{mean, median};
 use minimal_surprise_controller::{Prediction, Template};
 use minimal_surprise_sim::structures::{LineOrientation, Structure};
@@ -56,6 +60,19 @@ impl Value {
             what: what.to_owned(),
             ..Self::default()
         }
+    }
+
+    /// Whether it is of a test that could have found a difference.
+    pub fn could_differ(&self) -> bool {
+        let too_few = self.test == Some(SIGN_TEST) && self.of < RUNS_MIN;
+        self.p.is_some() && !too_few
+    }
+
+    /// Whether it is the same as another, from another table.
+    pub fn repeats(&self, other: &Self) -> bool {
+        (&self.setting, &self.what) == (&other.setting, &other.what)
+            && (self.of, self.ours, self.paper, self.p)
+                == (other.of, other.ours, other.paper, other.p)
     }
 
     fn within(mut self, interval: Option<Interval>, scale: f64) -> Self {
@@ -148,6 +165,7 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Vec<Table> {
         tables.extend(numbers(experiment, &groups, paper));
     }
     tables.extend(orientations(gathered, paper));
+    tables.extend(new_starts(gathered));
     tables.extend(gathered.resiliences.iter().map(|r| resilience(r, paper)));
     tables
 }
@@ -284,6 +302,7 @@ fn share_table(
                 .to_owned(),
         );
     }
+    notes.extend(shared.iter().filter_map(groupings_together));
     notes.extend(
         shared.iter().filter_map(|shared| {
             Some(format!("{}: {}", shared.name, shared.paper?.note.as_ref()?))
@@ -297,6 +316,26 @@ fn share_table(
         columns,
         rows: rows.collect(),
     }
+}
+
+/// How many runs form any of the groupings, if the paper tells them apart.
+fn groupings_together(shared: &Shared<'_>) -> Option<String> {
+    let paper = shared.paper.filter(|_| shared.of == Of::Structures)?;
+    let groupings = Structure::ALL.into_iter().filter(|s| is_grouping(*s));
+    let values: Vec<Value> = groupings
+        .filter(|structure| shared.has(structure.name()))
+        .map(|structure| share(shared, structure.name()))
+        .collect();
+    let theirs: f64 = values.iter().filter_map(|value| value.paper).sum();
+    let told_apart = values.iter().filter(|v| v.paper > Some(0.0)).count();
+    (told_apart > 1).then(|| {
+        let ours: f64 = values.iter().filter_map(|value| value.ours).sum();
+        format!(
+            "{}: {ours:.1} % are aggregation, clustering or loose grouping; paper {theirs} % of {}.",
+            shared.name,
+            plural(paper.runs as usize, "run")
+        )
+    })
 }
 
 /// Share of runs in a category, in percent.
@@ -586,16 +625,18 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
         .map(|number| number.source.as_str())
         .collect();
     sources.dedup();
+    let note = if sources.is_empty() {
+        "Medians with bootstrap 95 % interval."
+    } else {
+        "Medians with bootstrap 95 % interval and sign test against the paper's median, the \
+         printed number being taken as exact to half its last digit; percentages with Wilson's \
+         interval and Fisher's test."
+    };
     Some(Table {
         id: format!("numbers-{experiment}"),
         source: sources.join(", "),
         title: format!("{experiment}: fitness and other numbers"),
-        notes: vec![
-            "Medians with bootstrap 95 % interval and sign test against the paper's median, the \
-             printed number being taken as exact to half its last digit; percentages with Wilson's \
-             interval and Fisher's test."
-                .to_owned(),
-        ],
+        notes: vec![note.to_owned()],
         columns,
         rows,
     })
@@ -703,6 +744,66 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
     Some(table)
 }
 
+/// What the genomes of every setting formed from new starts.
+fn new_starts(gathered: &Gathered) -> Option<Table> {
+    let done = gathered
+        .reevaluations
+        .iter()
+        .filter(|reevaluated| !reevaluated.genomes.is_empty());
+    let done: Vec<&Reevaluated> = done.collect();
+    let shared: Vec<Shared<'_>> = done
+        .iter()
+        .map(|reevaluated| {
+            let name = |names: &[Structure]| match names {
+                [] => vec![NONE.to_owned()],
+                names => names.iter().map(|s| s.name().to_owned()).collect(),
+            };
+            let setting = format!("{}: {}", reevaluated.experiment, reevaluated.label);
+            let genomes = reevaluated.genomes.len();
+            Shared {
+                name: setting.clone(),
+                setting: format!("{}, {setting}", reevaluated.name),
+                counted: format!(
+                    "{}, {} each",
+                    plural(genomes, "genome"),
+                    plural(reevaluated.starts as usize, "start")
+                ),
+                runs: reevaluated
+                    .genomes
+                    .iter()
+                    .flatten()
+                    .map(|start| name(&start.names))
+                    .collect(),
+                of: Of::Structures,
+                paper: None,
+            }
+        })
+        .collect();
+    let categories = structure_order(&shared);
+    let id = "new-starts".to_owned();
+    let title = "Percentage of new starts by the structure that they end in".to_owned();
+    let mut table = share_table(id, String::new(), title, &shared, &categories);
+    table.notes = vec![
+        "Percent of all starts of all genomes; one tied between k structures counts 1/k for each. \
+         The starts of a genome are not independent, so that there is no interval; that of the \
+         fitness is the bootstrap 95 % interval of the median of the genomes' mean fitnesses."
+            .to_owned(),
+    ];
+    table.columns.insert(0, "median fitness".to_owned());
+    for ((row, shared), reevaluated) in table.rows.iter_mut().zip(&shared).zip(&done) {
+        for value in row.values.iter_mut().flatten() {
+            (value.low, value.high) = (None, None);
+        }
+        let of_genome = |starts: &Vec<NewStart>| {
+            mean(&starts.iter().map(|start| start.fitness).collect::<Vec<_>>())
+        };
+        let fitness: Vec<f64> = reevaluated.genomes.iter().map(of_genome).collect();
+        let value = median_value(&shared.setting, "median fitness", &fitness, 3);
+        row.values.insert(0, Some(value));
+    }
+    (!table.rows.is_empty()).then_some(table)
+}
+
 /// Tables 7 and 8.
 fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
     let name = &resilient.asked.name;
@@ -719,37 +820,38 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
         "similarity",
     ];
     let mut notes = vec![format!(
-        "{} of {} runs of {} looked through are named after the structure ({}).",
-        resilient.named, resilient.looked_through, resilient.asked.of, resilient.structure
+        "Named after the structure ({}): {} of {} of {}.",
+        resilient.structure,
+        resilient.named,
+        plural(resilient.looked_through, "run"),
+        resilient.asked.of
     )];
     let mut rows = Vec::new();
     if let Some(damaged) = &resilient.damaged {
         let chosen = match resilient.further {
             0 => "Of these the one with the largest share was damaged".to_owned(),
             further => format!(
-                "So evolution went on, of all settings in turn, and the first that is, run \
+                "So evolution went on, of all settings in turn, and the first named so, run \
                  {further} beyond the plan, was damaged"
             ),
         };
+        let grid = damaged.run.finished.settings.scenario.grid();
         notes.push(format!(
-            "{chosen}: {}, seed {}. Means, medians in brackets. It is another genome than the \
-             paper's, so that the numbers need not be the same and are not tested.",
+            "{chosen}: {}, seed {}. Means, medians in brackets with their bootstrap 95 % interval.",
             damaged.label, damaged.run.finished.settings.seed
         ));
-        let all = resilient.overall;
-        if all.areas > 0 {
+        if !of_paper.is_empty() {
+            let grids = if grid.to_string() == DAMAGED_GRID {
+                String::new()
+            } else {
+                format!(" and on another grid, {grid} instead of {DAMAGED_GRID}")
+            };
             notes.push(format!(
-                "All {} runs damaged likewise, {} areas: the share at the end is at least that at \
-                 the start after {} removals (mean change {:+.1} points) and after repositioning \
-                 from {} areas ({:+.1} points).",
-                resilient.named,
-                all.areas,
-                all.removal_holds,
-                100.0 * all.removal_gain,
-                all.repositioning_holds,
-                100.0 * all.repositioning_gain
+                "It is another genome than the paper's{grids}, so that the numbers need not be the \
+                 same and are not tested."
             ));
         }
+        notes.extend(all_damaged(resilient).map(|words| words + "."));
         for area in &damaged.areas {
             let r = area.rectangle;
             notes.push(format!(
@@ -775,22 +877,22 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
                     .iter()
                     .zip(columns_values)
                     .map(|(what, (values, theirs, digits))| {
-                        Some(Value {
-                            of: values.len(),
-                            ours: Some(mean(&values)),
-                            ours_median: (values.len() > 1).then(|| median(&values)),
-                            paper: theirs.map(|t| t.mean),
-                            paper_median: theirs.and_then(|t| t.median),
-                            digits,
-                            ..Value::new(&row_name, what)
-                        })
+                        Some(
+                            Value {
+                                of: values.len(),
+                                ours: Some(mean(&values)),
+                                ours_median: (values.len() > 1).then(|| median(&values)),
+                                paper: theirs.map(|t| t.mean),
+                                paper_median: theirs.and_then(|t| t.median),
+                                digits,
+                                ..Value::new(&row_name, what)
+                            }
+                            .within(median_interval(&values).filter(|_| values.len() > 1), 1.0),
+                        )
                     });
             rows.push(Row {
                 values: values.collect(),
-                counted: match row.fitness.len() {
-                    1 => "1 run".to_owned(),
-                    more => format!("{more} runs"),
-                },
+                counted: plural(row.fitness.len(), "run"),
                 name: row_name,
             });
         }
@@ -802,7 +904,8 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
     }
     Table {
         id: if source.is_empty() {
-            name.clone()
+            // The figure has the name itself.
+            format!("numbers-{name}")
         } else {
             file_name(&source)
         },
