@@ -1,6 +1,7 @@
 //! The pages, opened from files in a headless Chromium that has no network.
 
 use minimal_surprise_evolver::finished_run::FinishedRun;
+use minimal_surprise_evolver::replay::page::page;
 use minimal_surprise_evolver::replay::recording::Recording;
 use minimal_surprise_evolver::replay::scene::{Colouring, Scene};
 use minimal_surprise_sim::damage::{Area, Damage};
@@ -185,7 +186,14 @@ fn a_page_whose_steps_are_not_those_of_the_run_says_so() {
         .text("runs/run/final.json")
         .replace(recorded, &other);
     evolver.write("runs/run/final.json", changed.as_bytes());
-    succeed(&evolver, "replay runs/run --html run.html");
+    // The program refuses such a run; a page may be changed later.
+    assert_refused(
+        &run(&evolver, "replay runs/run --html run.html"),
+        &["runs/run", "another run's"],
+    );
+    let recording = recording_of(&evolver, "runs/run");
+    let text = page(&recording, Colouring::Structure, None).unwrap();
+    evolver.write("run.html", text.as_bytes());
     open(&mut browser, &evolver.folder().join("run.html"));
     let (status, words) = checked(&mut browser);
     assert_eq!(status, "bad");

@@ -485,6 +485,50 @@ fn a_run_directory_that_is_not_whole_is_refused() {
 }
 
 #[test]
+fn a_run_with_the_genome_or_the_state_of_another_is_refused_by_all_who_replay_it() {
+    let evolver = with_a_run();
+    let other = "evolve --population 6 --generations 3 --repetitions 2 --steps 60 --robots 60 \
+                 --seed 5 --out other";
+    assert_eq!(evolver.run(&words(other)).code, Some(0));
+    let state = evolver.text("run/final.json");
+    let hash_at = state.find("steps_hash").expect("it is recorded") + "steps_hash\": \"".len();
+    let mut other_hash = state.clone();
+    let digit = if &state[hash_at..=hash_at] == "0" {
+        "1"
+    } else {
+        "0"
+    };
+    other_hash.replace_range(hash_at..=hash_at, digit);
+    let spoilt = [
+        ("best.genome", evolver.read("other/best.genome")),
+        ("final.json", evolver.read("other/final.json")),
+        ("final.json", other_hash.into_bytes()),
+    ];
+    let lines = [
+        "classify run",
+        "damage run --area 0,0,7,7 --remove --structure clustering",
+        "replay run --svg out",
+        "replay run --html out",
+        "replay run --remove 0,0,3,3 --svg out",
+        "replay run",
+        "export run --format trajectory --out out",
+        "gallery run --out out",
+    ];
+    for (file, bytes) in spoilt {
+        let file = format!("run/{file}");
+        let good = evolver.read(&file);
+        evolver.write(&file, &bytes);
+        for line in lines {
+            let run = evolver.run(&words(line));
+            assert_refused(&run, &["error: run: best.genome", "final.json", "another"]);
+            assert!(!evolver.folder().join("out").exists(), "{line}");
+        }
+        evolver.write(&file, &good);
+    }
+    replay(&evolver, "run --svg out");
+}
+
+#[test]
 fn a_trajectory_of_one_state_is_nothing_to_replay() {
     let evolver = with_a_run();
     let exported = evolver.run(&words("export run --format trajectory --out trajectory"));

@@ -108,7 +108,7 @@ fn is_for_a_chip(format: Format) -> bool {
 }
 
 fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
-    let finished = FinishedRun::read(&arguments.from).map_err(BadInput::new)?;
+    let finished = FinishedRun::read_and_check(&arguments.from).map_err(BadInput::new)?;
     let trace = finished.trace()?;
     let grid = finished.settings.scenario.grid();
     let mut text = Vec::new();

@@ -141,7 +141,7 @@ fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {
     let conditions = &arguments.conditions;
     if path.is_dir() {
         conditions.refuse_beside("a run directory", path)?;
-        let finished = FinishedRun::read(path).map_err(BadInput::new)?;
+        let finished = FinishedRun::read_and_check(path).map_err(BadInput::new)?;
         return of_run(arguments, &name, &finished);
     }
     for (flag, given) in [

@@ -224,7 +224,7 @@ fn page_name(run: &str, taken: &BTreeSet<String>) -> String {
 }
 
 fn read(run: &Path) -> Result<Recording, GalleryError> {
-    let finished = FinishedRun::read(run)?;
+    let finished = FinishedRun::read_and_check(run)?;
     let name = run.display().to_string();
     Recording::of_run(&name, &finished).map_err(|error| GalleryError::World {
         path: run.to_owned(),
