@@ -508,7 +508,14 @@ fn the_same_run_has_the_same_page_and_pages_are_small() {
         &evolver,
         "replay runs/run/best.genome --steps 10000 --html long.html",
     );
-    for (name, most) in [("one.html", 300_000), ("long.html", 3_000_000)] {
+    let line = "replay runs/run/best.genome --noise 0.15 --steps 10000 --html noisy.html";
+    succeed(&evolver, line);
+    let pages = [
+        ("one.html", 300_000),
+        ("long.html", 3_000_000),
+        ("noisy.html", 3_000_000),
+    ];
+    for (name, most) in pages {
         let bytes = evolver.read(name).len();
         println!("{name}: {bytes} bytes, at most {most}");
         assert!(bytes <= most, "{name}: {bytes}");

@@ -12,6 +12,7 @@ use minimal_surprise_sim::damage::{Damage, DamageError};
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::metrics::Measures;
+use minimal_surprise_sim::noise::NoiseStream;
 use minimal_surprise_sim::structures::{Structure, classify};
 use minimal_surprise_sim::{Area, Grid, Pose, Scenario, Trace, TraceStep, Trial, WorldError};
 use rayon::prelude::*;
@@ -45,6 +46,8 @@ pub struct Minds {
     pub topology: Topology,
     /// What every robot's first reading is compared with.
     pub first_prediction: SensorBits,
+    /// What flips readings.
+    pub noise: NoiseStream,
     /// Fitness after every step, 0 to 1 (paper, Eq. 1, over the steps so far).
     pub fitness: Vec<f64>,
     /// Average prediction of every sensor over the run, 0 to 1.
@@ -141,6 +144,7 @@ impl Recording {
         })?;
         let minds = Minds {
             topology,
+            noise: trial.noise.clone(),
             first_prediction: State::new(&controller).prediction(),
             fitness,
             average_prediction: measures.average_prediction(),
