@@ -29,7 +29,8 @@ pub struct Recording {
     /// For every state and robot, the structures that it belongs to: bit `i` for
     /// `Structure::ALL[i]`.
     pub members: Vec<Vec<u8>>,
-    /// The structures that the final state is named after; several if tied.
+    /// The structures that the run is named after, those of its final state, or of the state before
+    /// it was damaged; several if tied.
     pub names: Vec<Structure>,
     /// Temperature of every step, 0 to 1 (paper, Eqs. 2–3).
     pub temperature: Vec<f64>,
@@ -113,7 +114,9 @@ impl Recording {
             damage: Some(Damaged { damage, before }),
             ..origin(name, finished)
         };
-        Ok(Self::of_trial(&finished.genome, &scenario, &trial, origin)?)
+        let names = classify(scenario.grid(), &finished.final_poses)?.names();
+        let recording = Self::of_trial(&finished.genome, &scenario, &trial, origin)?;
+        Ok(Self { names, ..recording })
     }
 
     /// A genome under some conditions.
@@ -262,14 +265,14 @@ impl Recording {
         members.is_some_and(|&members| is_in(members, structure))
     }
 
-    /// The structure that the final state is named after, of tied ones the first in the paper's
+    /// The structure that the run is named after, of tied ones the first in the paper's
     /// order.
     #[must_use]
     pub fn name(&self) -> Option<Structure> {
         self.names.first().copied()
     }
 
-    /// Robots in the structure that the final state is named after, in state `t`.
+    /// Robots in the structure that the run is named after, in state `t`.
     #[must_use]
     pub fn in_structure(&self, t: usize) -> usize {
         self.name().map_or(0, |name| {
