@@ -425,6 +425,15 @@ fn the_gallery_sorts_filters_and_opens_replays_by_the_keyboard() {
             .map(|(_, name)| format!("{name}.html"))
             .collect::<Vec<_>>()
     };
+    let cards: Vec<String> = browser.evaluate(
+        "[...document.querySelectorAll('#runs .how')].map(({ textContent }) => textContent)",
+    );
+    assert!(
+        cards
+            .iter()
+            .any(|card| card.contains("100 robots") && card.ends_with("seed 1 · one")),
+        "{cards:?}"
+    );
     let shown = "gallery.state().shown.map(({ page }) => page)";
     assert_eq!(browser.evaluate::<Vec<String>>(shown), finals("fitness"));
     browser.press("s");

@@ -247,6 +247,7 @@ impl Card {
         let share = recording.in_structure(last) as f64 / recording.robots().max(1) as f64;
         let about = json!({
             "page": page,
+            "source": page::source(&recording.origin.name),
             "names": recording.names.iter().map(|name| name.name()).collect::<Vec<_>>(),
             "share": share,
             "fitness": minds.and_then(|minds| minds.fitness.last()),

@@ -169,7 +169,7 @@ fn title(recording: &Recording) -> String {
 }
 
 /// The last part of a path: a page says nothing of the folders of whoever wrote it.
-fn source(name: &str) -> String {
+pub(super) fn source(name: &str) -> String {
     let path = std::path::Path::new(name);
     let last = path.file_name().map(|last| last.to_string_lossy());
     last.map_or_else(|| name.to_owned(), |last| last.into_owned())
