@@ -1,6 +1,7 @@
 //! The pages, opened from files in a headless Chromium that has no network.
 
 use minimal_surprise_evolver::finished_run::FinishedRun;
+use minimal_surprise_evolver::replay::page::page;
 use minimal_surprise_evolver::replay::recording::Recording;
 use minimal_surprise_evolver::replay::scene::{Colouring, Scene};
 use minimal_surprise_sim::damage::{Area, Damage};
@@ -185,7 +186,14 @@ fn a_page_whose_steps_are_not_those_of_the_run_says_so() {
         .text("runs/run/final.json")
         .replace(recorded, &other);
     evolver.write("runs/run/final.json", changed.as_bytes());
-    succeed(&evolver, "replay runs/run --html run.html");
+    // The program refuses such a run; a page may be changed later.
+    assert_refused(
+        &run(&evolver, "replay runs/run --html run.html"),
+        &["runs/run", "another run's"],
+    );
+    let recording = recording_of(&evolver, "runs/run");
+    let text = page(&recording, Colouring::Structure, None).unwrap();
+    evolver.write("run.html", text.as_bytes());
     open(&mut browser, &evolver.folder().join("run.html"));
     let (status, words) = checked(&mut browser);
     assert_eq!(status, "bad");
@@ -417,6 +425,15 @@ fn the_gallery_sorts_filters_and_opens_replays_by_the_keyboard() {
             .map(|(_, name)| format!("{name}.html"))
             .collect::<Vec<_>>()
     };
+    let cards: Vec<String> = browser.evaluate(
+        "[...document.querySelectorAll('#runs .how')].map(({ textContent }) => textContent)",
+    );
+    assert!(
+        cards
+            .iter()
+            .any(|card| card.contains("100 robots") && card.ends_with("seed 1 · one")),
+        "{cards:?}"
+    );
     let shown = "gallery.state().shown.map(({ page }) => page)";
     assert_eq!(browser.evaluate::<Vec<String>>(shown), finals("fitness"));
     browser.press("s");
@@ -500,7 +517,14 @@ fn the_same_run_has_the_same_page_and_pages_are_small() {
         &evolver,
         "replay runs/run/best.genome --steps 10000 --html long.html",
     );
-    for (name, most) in [("one.html", 300_000), ("long.html", 3_000_000)] {
+    let line = "replay runs/run/best.genome --noise 0.15 --steps 10000 --html noisy.html";
+    succeed(&evolver, line);
+    let pages = [
+        ("one.html", 300_000),
+        ("long.html", 3_000_000),
+        ("noisy.html", 3_000_000),
+    ];
+    for (name, most) in pages {
         let bytes = evolver.read(name).len();
         println!("{name}: {bytes} bytes, at most {most}");
         assert!(bytes <= most, "{name}: {bytes}");

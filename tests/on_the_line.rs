@@ -6,6 +6,7 @@ use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Topology};
 use minimal_surprise_link::Handler;
 use serde_json::Value;
 use std::time::Duration;
+use tests::full;
 use tests::genome::{of_another_kernel, random};
 use tests::link_robot::Flash;
 use tests::program::{Evolver, Finished};
@@ -339,7 +340,7 @@ fn a_line_pulled_half_way_leaves_the_old_genome_in_use() {
             (Fault::MuteAfter(done), "no answer any more"),
         ] {
             // The longest time-out is that of erasing.
-            if fault == Fault::MuteAfter(2) {
+            if fault == Fault::MuteAfter(2) && !full::all_cases() {
                 continue;
             }
             let robot = with_the_old_genome(&evolver, fault);

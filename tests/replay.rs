@@ -156,6 +156,10 @@ fn a_still_has_the_width_of_a_column_and_words_of_seven_points() {
         "run --svg b.svg --png b.png --width-mm 170 --dpi 100",
     );
     assert!(evolver.text("b.svg").contains("width=\"170mm\""));
+    let ground = pixels.at(0, 0);
+    let rows = pixels.rgb.chunks_exact(pixels.width);
+    let last = rows.last().expect("it has rows");
+    assert!(last.iter().all(|&pixel| pixel == ground), "no grey row");
     let (pixels, per_metre) = png_pixels(&evolver.read("b.png"));
     assert_eq!((pixels.width, per_metre), (669, Some(3937)));
 }
@@ -358,6 +362,13 @@ fn without_ffmpeg_there_is_no_mp4_but_a_word_on_what_to_install() {
         &run,
         &["--mp4 = a.mp4", "ffmpeg", "apt-get install", "--gif"],
     );
+    // Nor is anything else written.
+    let both = words("replay run --gif a.gif --svg a.svg --mp4 a.mp4");
+    let run = evolver.run_with(("PATH", "/nowhere"), &both);
+    assert_refused(&run, &["--mp4 = a.mp4", "ffmpeg"]);
+    for file in ["a.gif", "a.svg", "a.mp4"] {
+        assert!(!evolver.folder().join(file).exists(), "{file}");
+    }
     let fails = "#!/bin/sh\necho 'Unknown encoder' >&2\nexit 3\n";
     let path = stand_in(&evolver, fails);
     let run = evolver.run_with(("PATH", &path), &flags);
@@ -482,6 +493,88 @@ fn a_run_directory_that_is_not_whole_is_refused() {
     let still = |text: &str| Some(text.replace("steps = 60", "steps = 0"));
     refused("config.toml", &still, &["config.toml", "steps", "0"]);
     replay(&evolver, "run --svg a.svg");
+}
+
+#[test]
+fn genomes_are_taken_from_run_directories_and_nothing_is_exported_over_a_file() {
+    let evolver = with_a_run();
+    for line in ["inspect", "export --format c", "export --format hex"] {
+        let of = |from: &str| evolver.run(&[words(line), vec![from]].concat());
+        let (run, genome) = (of("run"), of("run/best.genome"));
+        assert_eq!(run.code, Some(0), "{run:?}");
+        assert_eq!(run.stdout, genome.stdout);
+    }
+    let run = evolver.run(&words("export run/best.genome --format trajectory"));
+    assert_refused(&run, &["run/best.genome", "of a run directory"]);
+    evolver.write("there", b"mine");
+    let run = evolver.run(&words("export run --format c --out there"));
+    assert_refused(&run, &["--out = there: it exists; name another"]);
+    assert_eq!(evolver.text("there"), "mine");
+}
+
+#[test]
+fn a_damaged_swarm_is_named_after_what_it_was_before() {
+    let evolver = with_a_run();
+    let classified = evolver.run(&words("classify run --json"));
+    let classified: serde_json::Value =
+        serde_json::from_str(&classified.stdout).expect("it is JSON");
+    let name = classified["names"][0].as_str().expect("it has a name");
+    // Of a swarm of which most is taken away, little is left to be named after.
+    replay(&evolver, "run --remove 0,0,14,11 --svg a.svg --html a.html");
+    assert!(
+        evolver
+            .text("a.svg")
+            .contains(&format!("aria-label=\"{name} "))
+    );
+    assert!(
+        evolver
+            .text("a.html")
+            .contains(&format!("\"names\":[\"{name}\""))
+    );
+}
+
+#[test]
+fn a_run_with_the_genome_or_the_state_of_another_is_refused_by_all_who_replay_it() {
+    let evolver = with_a_run();
+    let other = "evolve --population 6 --generations 3 --repetitions 2 --steps 60 --robots 60 \
+                 --seed 5 --out other";
+    assert_eq!(evolver.run(&words(other)).code, Some(0));
+    let state = evolver.text("run/final.json");
+    let hash_at = state.find("steps_hash").expect("it is recorded") + "steps_hash\": \"".len();
+    let mut other_hash = state.clone();
+    let digit = if &state[hash_at..=hash_at] == "0" {
+        "1"
+    } else {
+        "0"
+    };
+    other_hash.replace_range(hash_at..=hash_at, digit);
+    let spoilt = [
+        ("best.genome", evolver.read("other/best.genome")),
+        ("final.json", evolver.read("other/final.json")),
+        ("final.json", other_hash.into_bytes()),
+    ];
+    let lines = [
+        "classify run",
+        "damage run --area 0,0,7,7 --remove --structure clustering",
+        "replay run --svg out",
+        "replay run --html out",
+        "replay run --remove 0,0,3,3 --svg out",
+        "replay run",
+        "export run --format trajectory --out out",
+        "gallery run --out out",
+    ];
+    for (file, bytes) in spoilt {
+        let file = format!("run/{file}");
+        let good = evolver.read(&file);
+        evolver.write(&file, &bytes);
+        for line in lines {
+            let run = evolver.run(&words(line));
+            assert_refused(&run, &["error: run: best.genome", "final.json", "another"]);
+            assert!(!evolver.folder().join("out").exists(), "{line}");
+        }
+        evolver.write(&file, &good);
+    }
+    replay(&evolver, "run --svg out");
 }
 
 #[test]

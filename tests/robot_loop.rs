@@ -6,7 +6,7 @@ use firmware_example::robot::{Board, DATA_PERIODS_MAX, Motion, NEIGHBOURS_MAX, R
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, Provenance, encode};
 use minimal_surprise_controller::neighbours::{Detection, Neighbours};
 use minimal_surprise_controller::{Genome, Topology};
-use minimal_surprise_link::{CHUNK_BYTES_MAX, Client, Report, Request};
+use minimal_surprise_link::{CHUNK_BYTES_MAX, Client, Faults, Reply, Report, Request};
 use minimal_surprise_slots::{Buffer, Slots, crc_of};
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -30,6 +30,8 @@ struct TestBoard {
     arriving: VecDeque<u8>,
     period: bool,
     motion: Option<Motion>,
+    sent: Vec<u8>,
+    watchdog: bool,
     events: Events,
 }
 
@@ -62,7 +64,8 @@ impl Board for TestBoard {
         self.arriving.pop_front()
     }
 
-    fn send(&mut self, _: u8) -> bool {
+    fn send(&mut self, byte: u8) -> bool {
+        self.sent.push(byte);
         true
     }
 
@@ -77,7 +80,7 @@ impl Board for TestBoard {
     }
 
     fn restarted_by_watchdog(&self) -> bool {
-        false
+        self.watchdog
     }
 
     fn log(&mut self, _: &Report) {}
@@ -289,4 +292,42 @@ fn talking_does_not_feed_the_watchdog() {
         ask(&mut robot, session, &requests);
     }
     assert_eq!(robot.board().events(), []);
+}
+
+/// The faults that the robot names itself with, and those in its telemetry.
+fn faults(robot: &mut TestRobot) -> [Faults; 2] {
+    let mut client = Client::new(1, 1);
+    [Request::Identify, Request::Telemetry].map(|request| {
+        let frame = client.request(&request).unwrap().to_vec();
+        robot.board().arriving.extend(frame);
+        while !robot.board().arriving.is_empty() {
+            robot.go_round();
+        }
+        robot.go_round();
+        let sent = std::mem::take(&mut robot.board().sent);
+        let said = sent.into_iter().find_map(|byte| match client.feed(byte)? {
+            Reply::Identity(identity) => Some(identity.faults),
+            Reply::Telemetry { report, .. } => Some(report.faults),
+            _ => None,
+        });
+        said.expect("an answer")
+    })
+}
+
+#[test]
+fn a_robot_restarted_by_the_watchdog_stands_and_says_so() {
+    for watchdog in [false, true] {
+        let board = TestBoard {
+            watchdog,
+            ..TestBoard::default()
+        };
+        let events = Rc::clone(&board.events);
+        let memory = MemoryFlash::new();
+        let mut robot = Robot::start(board, TestFlash { memory, events }, 0).unwrap();
+        assert_eq!(robot.board().motion, Some(Motion::Stop));
+        assert_eq!(period(&mut robot, Some(false)), Some(Motion::Stop));
+        for faults in faults(&mut robot) {
+            assert_eq!(faults.contains(Faults::WATCHDOG), watchdog);
+        }
+    }
 }

@@ -71,7 +71,8 @@ enum Command {
     Import(ImportArgs),
     /// Show everything in a genome file.
     Inspect {
-        /// The genome file.
+        /// The genome file, or a run directory.
+        #[arg(value_name = "GENOME|RUN")]
         genome: PathBuf,
     },
     /// The experiments of the paper: all its evolutions, one after the other or on a cluster.

@@ -2,6 +2,7 @@
 
 use crate::files::{self, FileError};
 use crate::settings::{Given, SettingError, Settings};
+use crate::steps_hash::StepsHash;
 use minimal_surprise_controller::{Controller, DecodeError, EncodedGenome, Genome, Provenance};
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::metrics::Measures;
@@ -281,6 +282,37 @@ pub fn is_complete(path: &Path) -> Result<bool, ReadRunError> {
 }
 
 impl FinishedRun {
+    /// Reads a run directory and runs it once more, for all who show or continue what happened: a
+    /// genome or a state that is another run's, or was changed, is found out here.
+    ///
+    /// # Errors
+    /// [`ReadRunError`] if [`read`](Self::read) fails, or the steps or where they end are not what
+    /// the run wrote down.
+    pub fn read_and_check(path: &Path) -> Result<Self, ReadRunError> {
+        let finished = Self::read(path)?;
+        let mut hash = StepsHash::starting_from(&finished.starts);
+        let mut ends = finished.starts.clone();
+        finished
+            .replay(|world| {
+                hash.observe(world);
+                ends.copy_from_slice(world.poses());
+            })
+            .map_err(|error| StateError::Poses {
+                path: path.join("final.json"),
+                error,
+            })?;
+        let recorded = finished.steps_hash.as_ref();
+        let other_steps = recorded.is_some_and(|recorded| *recorded != hash.to_string());
+        if other_steps || ends != finished.final_poses {
+            return Err(ReadRunError::Inconsistent {
+                path: path.to_owned(),
+                problem: "best.genome does not take the steps that final.json records; one of its \
+                          files is another run's, or was changed",
+            });
+        }
+        Ok(finished)
+    }
+
     /// Reads a run directory.
     ///
     /// # Errors

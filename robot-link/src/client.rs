@@ -148,12 +148,6 @@ impl Client {
         }
     }
 
-    /// Whether a request waits for its reply.
-    #[must_use]
-    pub fn is_pending(&self) -> bool {
-        self.pending.is_some()
-    }
-
     /// Frames that arrived and were not the reply to the pending request.
     #[must_use]
     pub fn strays(&self) -> u32 {

@@ -66,6 +66,12 @@ impl NoiseStream {
         self.rate
     }
 
+    /// The ChaCha8 key of the stream, for those who draw it again elsewhere.
+    #[must_use]
+    pub fn key(&self) -> [u8; 32] {
+        self.stream.get_seed()
+    }
+
     /// Flips the readings of all robots in one step, robot 0 first.
     pub fn flip(&mut self, step: u32, readings: &mut [SensorBits]) {
         if self.rate.is_none() {

@@ -15,7 +15,7 @@ use std::path::Path;
 /// [`BadInput`] if there is nothing to classify.
 pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
     let (grid, poses, measures) = if path.is_dir() {
-        let finished = FinishedRun::read(path).map_err(BadInput::new)?;
+        let finished = FinishedRun::read_and_check(path).map_err(BadInput::new)?;
         let measures = finished.measures().map_err(BadInput::new)?;
         let grid = finished.settings.scenario.grid();
         (grid, finished.final_poses, Some(measures))

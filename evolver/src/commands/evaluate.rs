@@ -1,6 +1,6 @@
 //! `evolver evaluate`: a genome from new starts, under the conditions it evolved in or others.
 
-use super::{BadInput, thread_pool};
+use super::{BadInput, genome_file, thread_pool};
 use crate::files;
 use crate::reevaluation::rerun;
 use crate::report::reevaluation::{Condition, conditions_json, conditions_text};
@@ -52,11 +52,7 @@ pub struct EvaluateArgs {
 /// # Errors
 /// [`BadInput`] names the flag, the value and what would be valid.
 pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
-    let file = if arguments.genome.is_dir() {
-        arguments.genome.join("best.genome")
-    } else {
-        arguments.genome.clone()
-    };
+    let file = genome_file(&arguments.genome);
     let path = file.display();
     let bytes = files::read(&file).map_err(BadInput::new)?;
     let run = conditions_beside(&file)?;

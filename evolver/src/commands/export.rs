@@ -1,20 +1,21 @@
 //! `evolver export`: runs and genomes in the formats of other programs.
 
 use super::evaluate::flag;
-use super::{BadInput, read_genome};
+use super::replay::exists;
+use super::{BadInput, genome_file, read_genome};
 use crate::finished_run::FinishedRun;
 use crate::report::embedding::{c_header, intel_hex, probe_rs_line, rust_source, slot};
 use clap::{Args, ValueEnum};
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::exchange::Trajectory;
 use std::fs::OpenOptions;
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::PathBuf;
 
 /// What to export, and how.
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// The genome file; for trajectories, the run directory.
+    /// The genome file or a run directory; for trajectories, the run directory.
     #[arg(value_name = "GENOME|RUN")]
     from: PathBuf,
     /// The format.
@@ -83,22 +84,25 @@ pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
         }
         None => crate::output::write_bytes(&bytes),
         Some(path) => {
-            let mut file = OpenOptions::new()
-                .write(true)
-                .create_new(true)
-                .open(path)
-                .map_err(|error| BadInput::new(format!("--out = {}: {error}", path.display())))?;
+            let file = OpenOptions::new().write(true).create_new(true).open(path);
+            let mut file = file.map_err(|error| match error.kind() {
+                ErrorKind::AlreadyExists => exists("out", path, ""),
+                _ => BadInput::new(format!("--out = {}: {error}", path.display())),
+            })?;
             file.write_all(&bytes)?;
         }
     }
     let file = match arguments.format {
         // The genome file is the raw form itself.
-        Format::Bin => Some(arguments.out.as_ref().unwrap_or(&arguments.from)),
-        Format::Slot => arguments.out.as_ref(),
+        Format::Bin => {
+            let out = arguments.out.clone();
+            Some(out.unwrap_or_else(|| genome_file(&arguments.from)))
+        }
+        Format::Slot => arguments.out.clone(),
         _ => None,
     };
     if let Some(file) = file {
-        eprintln!("{}", probe_rs_line(file, &arguments.chip, address));
+        eprintln!("{}", probe_rs_line(&file, &arguments.chip, address));
     }
     Ok(())
 }
@@ -108,7 +112,14 @@ fn is_for_a_chip(format: Format) -> bool {
 }
 
 fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
-    let finished = FinishedRun::read(&arguments.from).map_err(BadInput::new)?;
+    if arguments.from.is_file() {
+        return Err(BadInput::new(format!(
+            "{}: a trajectory is exported of a run directory, not of a file",
+            arguments.from.display()
+        ))
+        .into());
+    }
+    let finished = FinishedRun::read_and_check(&arguments.from).map_err(BadInput::new)?;
     let trace = finished.trace()?;
     let grid = finished.settings.scenario.grid();
     let mut text = Vec::new();

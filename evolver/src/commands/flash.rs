@@ -9,7 +9,8 @@ use std::path::PathBuf;
 /// Which genome, and where the robot is.
 #[derive(Debug, Args)]
 pub struct FlashArgs {
-    /// The genome file.
+    /// The genome file, or a run directory.
+    #[arg(value_name = "GENOME|RUN")]
     genome: PathBuf,
     #[command(flatten)]
     port: PortArgs,

@@ -83,7 +83,7 @@ fn of_run(arguments: &HilArgs) -> Result<(Course, PathBuf), BadInput> {
     arguments
         .conditions
         .refuse_beside("a run directory", directory)?;
-    let finished = FinishedRun::read(directory).map_err(BadInput::new)?;
+    let finished = FinishedRun::read_and_check(directory).map_err(BadInput::new)?;
     let course = Course {
         controller: Controller::new(&finished.genome),
         scenario: finished.settings.scenario,

@@ -22,7 +22,7 @@ use crate::robot::PortName;
 use crate::settings::count;
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Input that cannot be used, in one message.
 #[derive(Debug, thiserror::Error)]
@@ -68,8 +68,19 @@ impl PortArgs {
     }
 }
 
-/// The bytes of a genome file, after a look whether they are a genome for this program.
+/// The genome file that a path names: of a run directory, its best genome.
+fn genome_file(path: &Path) -> PathBuf {
+    if path.is_dir() {
+        path.join("best.genome")
+    } else {
+        path.to_owned()
+    }
+}
+
+/// The bytes of a genome file, or of a run directory's, after a look whether they are a genome for
+/// this program.
 fn read_genome(path: &Path) -> Result<Vec<u8>, BadInput> {
+    let path = &genome_file(path);
     let bytes = files::read(path).map_err(BadInput::new)?;
     match EncodedGenome::decode(&bytes) {
         Ok(_) => Ok(bytes),

@@ -172,6 +172,9 @@ impl PictureArgs {
             ))
             .into());
         }
+        if self.mp4.is_some() {
+            Film::look_for_ffmpeg().map_err(|error| self.about(error))?;
+        }
         let look = |size| Look {
             size,
             theme: self.theme.theme(),

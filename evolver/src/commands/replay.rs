@@ -39,10 +39,12 @@ Keys in the terminal:
 pub struct ReplayArgs {
     /// A run directory, a genome file, or an agent_trajectory.
     run: PathBuf,
-    /// For a run: take the robots in this area of its final state away, and go on from there.
+    /// For a run: take the robots in this area of its final state away, and go on from there. Corners
+    /// are included; x0 > x1 or y0 > y1 goes across the edge.
     #[arg(long, value_name = "x0,y0,x1,y1", allow_hyphen_values = true)]
     remove: Option<String>,
-    /// For a run: put the robots in this area of its final state elsewhere, and go on from there.
+    /// For a run: put the robots in this area of its final state elsewhere, and go on from there. Corners
+    /// are included; x0 > x1 or y0 > y1 goes across the edge.
     #[arg(
         long,
         value_name = "x0,y0,x1,y1",
@@ -127,12 +129,17 @@ fn stop_on_signal() -> Result<Arc<AtomicBool>, ctrlc::Error> {
 /// Refuses to write where there is something.
 pub(super) fn refuse_existing(flag: &str, path: &Path, overwrite: bool) -> Result<(), BadInput> {
     if !overwrite && path.symlink_metadata().is_ok() {
-        return Err(BadInput::new(format!(
-            "--{flag} = {}: it exists; name another, or replace it with --overwrite",
-            path.display()
-        )));
+        return Err(exists(flag, path, ", or replace it with --overwrite"));
     }
     Ok(())
+}
+
+/// There is something where a flag says to write.
+pub(super) fn exists(flag: &str, path: &Path, or_else: &str) -> BadInput {
+    BadInput::new(format!(
+        "--{flag} = {}: it exists; name another{or_else}",
+        path.display()
+    ))
 }
 
 fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {
@@ -141,7 +148,7 @@ fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {
     let conditions = &arguments.conditions;
     if path.is_dir() {
         conditions.refuse_beside("a run directory", path)?;
-        let finished = FinishedRun::read(path).map_err(BadInput::new)?;
+        let finished = FinishedRun::read_and_check(path).map_err(BadInput::new)?;
         return of_run(arguments, &name, &finished);
     }
     for (flag, given) in [

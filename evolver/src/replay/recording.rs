@@ -12,6 +12,7 @@ use minimal_surprise_sim::damage::{Damage, DamageError};
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::metrics::Measures;
+use minimal_surprise_sim::noise::NoiseStream;
 use minimal_surprise_sim::structures::{Structure, classify};
 use minimal_surprise_sim::{Area, Grid, Pose, Scenario, Trace, TraceStep, Trial, WorldError};
 use rayon::prelude::*;
@@ -28,7 +29,8 @@ pub struct Recording {
     /// For every state and robot, the structures that it belongs to: bit `i` for
     /// `Structure::ALL[i]`.
     pub members: Vec<Vec<u8>>,
-    /// The structures that the final state is named after; several if tied.
+    /// The structures that the run is named after, those of its final state, or of the state before
+    /// it was damaged; several if tied.
     pub names: Vec<Structure>,
     /// Temperature of every step, 0 to 1 (paper, Eqs. 2–3).
     pub temperature: Vec<f64>,
@@ -45,6 +47,8 @@ pub struct Minds {
     pub topology: Topology,
     /// What every robot's first reading is compared with.
     pub first_prediction: SensorBits,
+    /// What flips readings.
+    pub noise: NoiseStream,
     /// Fitness after every step, 0 to 1 (paper, Eq. 1, over the steps so far).
     pub fitness: Vec<f64>,
     /// Average prediction of every sensor over the run, 0 to 1.
@@ -110,7 +114,9 @@ impl Recording {
             damage: Some(Damaged { damage, before }),
             ..origin(name, finished)
         };
-        Ok(Self::of_trial(&finished.genome, &scenario, &trial, origin)?)
+        let names = classify(scenario.grid(), &finished.final_poses)?.names();
+        let recording = Self::of_trial(&finished.genome, &scenario, &trial, origin)?;
+        Ok(Self { names, ..recording })
     }
 
     /// A genome under some conditions.
@@ -141,6 +147,7 @@ impl Recording {
         })?;
         let minds = Minds {
             topology,
+            noise: trial.noise.clone(),
             first_prediction: State::new(&controller).prediction(),
             fitness,
             average_prediction: measures.average_prediction(),
@@ -258,14 +265,14 @@ impl Recording {
         members.is_some_and(|&members| is_in(members, structure))
     }
 
-    /// The structure that the final state is named after, of tied ones the first in the paper's
+    /// The structure that the run is named after, of tied ones the first in the paper's
     /// order.
     #[must_use]
     pub fn name(&self) -> Option<Structure> {
         self.names.first().copied()
     }
 
-    /// Robots in the structure that the final state is named after, in state `t`.
+    /// Robots in the structure that the run is named after, in state `t`.
     #[must_use]
     pub fn in_structure(&self, t: usize) -> usize {
         self.name().map_or(0, |name| {

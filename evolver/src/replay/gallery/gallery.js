@@ -32,10 +32,10 @@ function makeCards(bytes) {
     name.textContent = structureOf(run);
     share.textContent = percent(run.share);
     what.append(name, share);
-    const facts = [`fitness ${run.fitness.toFixed(3)}`, run.grid.replace('x', ' × '), `model ${run.model}`];
+    const facts = [`fitness ${run.fitness.toFixed(3)}`, run.grid.replace('x', ' × '), `${run.robots} robots`, `model ${run.model}`];
     if (run.prediction !== 'free') facts.push(run.prediction);
     if (run.noise > 0) facts.push(`noise ${run.noise}`);
-    facts.push(`seed ${run.seed}`);
+    facts.push(`seed ${run.seed}`, run.source);
     how.textContent = facts.join(' · ');
     link.append(frame, what, how);
     item.append(link);

@@ -224,7 +224,7 @@ fn page_name(run: &str, taken: &BTreeSet<String>) -> String {
 }
 
 fn read(run: &Path) -> Result<Recording, GalleryError> {
-    let finished = FinishedRun::read(run)?;
+    let finished = FinishedRun::read_and_check(run)?;
     let name = run.display().to_string();
     Recording::of_run(&name, &finished).map_err(|error| GalleryError::World {
         path: run.to_owned(),
@@ -247,6 +247,7 @@ impl Card {
         let share = recording.in_structure(last) as f64 / recording.robots().max(1) as f64;
         let about = json!({
             "page": page,
+            "source": page::source(&recording.origin.name),
             "names": recording.names.iter().map(|name| name.name()).collect::<Vec<_>>(),
             "share": share,
             "fitness": minds.and_then(|minds| minds.fitness.last()),

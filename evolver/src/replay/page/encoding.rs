@@ -1,8 +1,8 @@
 //! The states of a recording as text for a page: bytes, deflated, in base64.
 //!
-//! The page reckons again whatever follows from poses (what is sensed) or from moves (the poses
-//! themselves), so that only what robots did, expected and belong to is stored, and the noise that
-//! flipped what they sensed.
+//! The page reckons again whatever follows from poses (what is sensed), from moves (the poses
+//! themselves) or from the key of the noise (what it flipped), so that only what robots did,
+//! expected and belong to is stored.
 //!
 //! | what | bytes |
 //! |---|---|
@@ -21,7 +21,6 @@
 //! |---|---|---|
 //! | move: bit 0 action, bit 1 turn, bit 2 whether it moved | steps | robots have minds |
 //! | prediction, low byte; high byte | states | robots have minds; more than 8 sensors |
-//! | noise, low byte; high byte | steps | any bit was flipped; any of the high byte |
 //! | x low, x high, y low, y high, heading | states | robots have no minds |
 //! | structures | states | |
 
@@ -29,9 +28,7 @@ use crate::replay::recording::Recording;
 use data_encoding::BASE64;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use minimal_surprise_controller::SensorBits;
-use minimal_surprise_controller::sensor::Cell;
-use minimal_surprise_sim::{Grid, Pose};
+use minimal_surprise_sim::Pose;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::io::Write;
@@ -52,24 +49,17 @@ pub struct Layout {
     pub minds: bool,
     /// Bytes of a prediction.
     pub prediction_bytes: usize,
-    /// Bytes of the noise of a reading: none without noise; noise flips bits beyond the sensors
-    /// too, and the hash of the steps covers them.
-    pub noise_bytes: usize,
 }
 
 /// The layout, and the text.
 #[must_use]
 pub fn encode(recording: &Recording) -> (Layout, String) {
-    let flipped = flipped(recording);
     let layout = Layout {
         robots: recording.robots(),
         steps: recording.steps(),
         block: BLOCK,
         minds: recording.minds.is_some(),
         prediction_bytes: sensors(recording).div_ceil(8),
-        noise_bytes: flipped.iter().flatten().fold(0, |bytes, &bits| {
-            bytes.max(usize::from(bits > 0) + usize::from(bits > 0xff))
-        }),
     };
     let mut bytes = Vec::new();
     let starts = recording.poses(0);
@@ -82,7 +72,7 @@ pub fn encode(recording: &Recording) -> (Layout, String) {
     let firsts: Vec<usize> = (0..layout.steps).step_by(BLOCK).collect();
     let blocks: Vec<Vec<u8>> = firsts
         .par_iter()
-        .map(|&first| block(recording, layout, &flipped, first))
+        .map(|&first| block(recording, layout, first))
         .collect();
     (layout, packed(&[&[bytes][..], &blocks].concat()))
 }
@@ -129,46 +119,8 @@ fn has_moved(from: Pose, to: Pose) -> bool {
     (from.x, from.y) != (to.x, to.y)
 }
 
-/// Of each step and robot, the sensors that noise flipped.
-fn flipped(recording: &Recording) -> Vec<Vec<u16>> {
-    let Some(minds) = &recording.minds else {
-        return Vec::new();
-    };
-    let cells = minds.topology.model().cells();
-    let steps = recording.trace.steps.par_iter();
-    let of_step = |occupied: &mut Vec<bool>, poses: &[Pose], readings: &[SensorBits]| {
-        set(occupied, recording.grid, poses, true);
-        let robots = poses.iter().zip(readings);
-        let flipped = robots
-            .map(|(&pose, reading)| reading.bits() ^ sensed(occupied, recording.grid, cells, pose))
-            .collect();
-        set(occupied, recording.grid, poses, false);
-        flipped
-    };
-    let empty = || vec![false; recording.grid.cells() as usize];
-    steps
-        .map_init(empty, |occupied, step| {
-            of_step(occupied, &step.poses, &step.readings)
-        })
-        .collect()
-}
-
-fn set(occupied: &mut [bool], grid: Grid, poses: &[Pose], to: bool) {
-    for pose in poses {
-        occupied[grid.cell(pose.x, pose.y) as usize] = to;
-    }
-}
-
-fn sensed(occupied: &[bool], grid: Grid, cells: &[Cell], pose: Pose) -> u16 {
-    cells.iter().enumerate().fold(0, |bits, (sensor, &cell)| {
-        let (dx, dy) = pose.heading.offset(cell);
-        let (x, y) = grid.moved(pose.x, pose.y, dx, dy);
-        bits | u16::from(occupied[grid.cell(x, y) as usize]) << sensor
-    })
-}
-
 /// The block that begins with a step.
-fn block(recording: &Recording, layout: Layout, flipped: &[Vec<u16>], first: usize) -> Vec<u8> {
+fn block(recording: &Recording, layout: Layout, first: usize) -> Vec<u8> {
     let steps = BLOCK.min(layout.steps - first);
     let mut bytes = Vec::new();
     if layout.minds {
@@ -179,15 +131,9 @@ fn block(recording: &Recording, layout: Layout, flipped: &[Vec<u16>], first: usi
             let bits = recording.predicted(t, robot);
             bits.map_or([0; 2], |bits| bits.bits().to_le_bytes())
         };
-        let noise = |t: usize, robot: usize| flipped[t][robot].to_le_bytes();
         for byte in 0..layout.prediction_bytes {
             bytes.extend(per_state(layout, first, steps, |t, robot| {
                 predicted(t, robot)[byte]
-            }));
-        }
-        for byte in 0..layout.noise_bytes {
-            bytes.extend(per_step(layout, first, steps, |t, robot| {
-                noise(t, robot)[byte]
             }));
         }
     } else {

@@ -14,6 +14,7 @@ use crate::settings::model_name;
 use html::Document;
 use minimal_surprise_controller::{Prediction, Topology};
 use minimal_surprise_sim::damage::Damage;
+use minimal_surprise_sim::noise::NoiseStream;
 use minimal_surprise_sim::{Heading, Structure};
 use serde_json::{Value, json};
 
@@ -113,6 +114,7 @@ fn about(recording: &Recording) -> Value {
         "turned": Heading::ALL.map(|heading| html::TURNS.map(|turn| heading.turned(turn))),
         "seed": origin.seed.map(|seed| seed.to_string()),
         "noise": origin.noise,
+        "flips": minds.and_then(|minds| flips(&minds.noise)),
         "run_hash": origin.run_hash,
         "recorded_hash": origin.steps_hash,
         "computed_hash": recording.steps_hash.map(|hash| hash.to_string()),
@@ -123,6 +125,15 @@ fn about(recording: &Recording) -> Value {
         "arrow": palette::ARROW,
         "hollow": hollow(),
     })
+}
+
+/// What the page draws the noise from again; nothing without noise.
+fn flips(noise: &NoiseStream) -> Option<Value> {
+    let key = noise.key();
+    let words = key.as_chunks::<4>().0.iter();
+    let words: Vec<u32> = words.map(|&word| u32::from_le_bytes(word)).collect();
+    let rate = noise.rate();
+    (!rate.is_none()).then(|| json!({ "key": words, "per_65536": rate.per_65_536() }))
 }
 
 /// Which inks are drawn as an outline.
@@ -158,7 +169,7 @@ fn title(recording: &Recording) -> String {
 }
 
 /// The last part of a path: a page says nothing of the folders of whoever wrote it.
-fn source(name: &str) -> String {
+pub(super) fn source(name: &str) -> String {
     let path = std::path::Path::new(name);
     let last = path.file_name().map(|last| last.to_string_lossy());
     last.map_or_else(|| name.to_owned(), |last| last.into_owned())

@@ -23,7 +23,7 @@ class Recording {
     for (let first = 0; first < T; first += BLOCK) {
       this.offsets.push(at);
       const n = Math.min(BLOCK, T - first);
-      const ofSteps = layout.minds ? 1 + layout.noise_bytes : 0;
+      const ofSteps = layout.minds ? 1 : 0;
       const ofStates = layout.minds ? layout.prediction_bytes + 1 : 6;
       at += R * (n * ofSteps + (n + 1) * ofStates);
     }
@@ -79,16 +79,15 @@ class Recording {
       headings: new Uint8Array(states),
       members: new Uint8Array(states),
       predicted: layout.minds ? new Uint16Array(states) : null,
-      noise: layout.noise_bytes ? new Uint16Array(n * R) : null,
       moves: layout.minds ? new Uint8Array(n * R) : null,
     };
     const bytes = this.bytes;
     let at = this.offsets[block];
-    const plane = (target, count, shift, changes) => {
+    const plane = (target, shift) => {
       for (let robot = 0; robot < R; robot++) {
         let value = 0;
-        for (let s = 0, to = robot; s < count; s++, to += R) {
-          value = changes ? value ^ bytes[at++] : bytes[at++];
+        for (let s = 0, to = robot; s <= n; s++, to += R) {
+          value ^= bytes[at++];
           target[to] |= value << shift;
         }
       }
@@ -113,14 +112,13 @@ class Recording {
           }
         }
       }
-      for (let i = 0; i < layout.prediction_bytes; i++) plane(decoded.predicted, n + 1, 8 * i, true);
-      for (let i = 0; i < layout.noise_bytes; i++) plane(decoded.noise, n, 8 * i, false);
+      for (let i = 0; i < layout.prediction_bytes; i++) plane(decoded.predicted, 8 * i);
     } else {
       for (const [target, shift] of [[xs, 0], [xs, 8], [ys, 0], [ys, 8], [headings, 0]]) {
-        plane(target, n + 1, shift, true);
+        plane(target, shift);
       }
     }
-    plane(decoded.members, n + 1, 0, true);
+    plane(decoded.members, 0);
     return decoded;
   }
 
@@ -156,10 +154,11 @@ const wrapped = (at, side) => (at < 0 ? at + side : at >= side ? at - side : at)
 class Board {
   constructor() {
     this.cells = new Uint8Array(width * height);
+    this.noise = about.flips ? new Noise(about.flips) : null;
   }
 
   /* What all robots of a state sense, noise included. */
-  sense({ xs, ys, headings, noise }, from, readings = new Uint16Array(R)) {
+  sense({ first, xs, ys, headings }, from, readings = new Uint16Array(R)) {
     const { cells } = this;
     for (let i = from; i < from + R; i++) cells[ys[i] * width + xs[i]] = 1;
     for (let robot = 0; robot < R; robot++) {
@@ -172,12 +171,65 @@ class Board {
         const y = wrapped(ys[i] + offsets[sensor][1], height);
         bits |= cells[y * width + x] << sensor;
       }
-      readings[robot] = noise ? bits ^ noise[i] : bits;
+      readings[robot] = bits;
     }
+    if (this.noise) this.noise.flip(first + from / R, readings);
     for (let i = from; i < from + R; i++) cells[ys[i] * width + xs[i]] = 0;
     return readings;
   }
 }
+
+/* The noise of noise.rs: ChaCha8, whose stream is the step; a robot has half of a block. */
+class Noise {
+  constructor({ key, per_65536 }) {
+    this.below = per_65536;
+    this.start = Int32Array.of(0x61707865, 0x3320646e, 0x79622d32, 0x6b206574, ...key, 0, 0, 0, 0);
+    this.words = new Int32Array(16);
+  }
+
+  /* Flips what all robots sense in a step. */
+  flip(step, readings) {
+    this.start[14] = step;
+    for (let robot = 0; robot < R; robot++) {
+      if (robot % 2 === 0) this.draw(robot / 2);
+      readings[robot] ^= this.half(8 * (robot % 2));
+    }
+  }
+
+  draw(block) {
+    const { start, words } = this;
+    start[12] = block;
+    words.set(start);
+    for (let round = 0; round < 8; round += 2) {
+      for (let i = 0; i < 4; i++) quarterRound(words, i, 4 + i, 8 + i, 12 + i);
+      for (let i = 0; i < 4; i++) quarterRound(words, i, 4 + ((i + 1) % 4), 8 + ((i + 2) % 4), 12 + ((i + 3) % 4));
+    }
+    for (let i = 0; i < 16; i++) words[i] += start[i];
+  }
+
+  half(from) {
+    let flips = 0;
+    for (let pair = 0; pair < 8; pair++) {
+      const word = this.words[from + pair];
+      if ((word & 0xffff) < this.below) flips |= 1 << (2 * pair);
+      if (word >>> 16 < this.below) flips |= 2 << (2 * pair);
+    }
+    return flips;
+  }
+}
+
+function quarterRound(words, a, b, c, d) {
+  words[a] += words[b];
+  words[d] = rotated(words[d] ^ words[a], 16);
+  words[c] += words[d];
+  words[b] = rotated(words[b] ^ words[c], 12);
+  words[a] += words[b];
+  words[d] = rotated(words[d] ^ words[a], 8);
+  words[c] += words[d];
+  words[b] = rotated(words[b] ^ words[c], 7);
+}
+
+const rotated = (word, by) => (word << by) | (word >>> (32 - by));
 
 /* ---- The scene: the rules of scene.rs ---- */
 

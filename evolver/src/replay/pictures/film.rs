@@ -143,6 +143,20 @@ impl Film<'_> {
         std::fs::read(&file).map_err(PictureError::Ffmpeg)
     }
 
+    /// Looks whether there is an ffmpeg, for those who want to know before they write anything.
+    ///
+    /// # Errors
+    /// [`PictureError`] if it cannot be started.
+    pub fn look_for_ffmpeg() -> Result<(), PictureError> {
+        let asked = Command::new("ffmpeg")
+            .arg("-version")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .status();
+        asked.map(|_| ()).map_err(not_started)
+    }
+
     fn start_ffmpeg(
         &self,
         pixels: &Pixels,
@@ -165,10 +179,14 @@ impl Film<'_> {
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()
-            .map_err(|error| match error.kind() {
-                ErrorKind::NotFound => PictureError::NoFfmpeg,
-                _ => PictureError::Ffmpeg(error),
-            })
+            .map_err(not_started)
+    }
+}
+
+fn not_started(error: std::io::Error) -> PictureError {
+    match error.kind() {
+        ErrorKind::NotFound => PictureError::NoFfmpeg,
+        _ => PictureError::Ffmpeg(error),
     }
 }
 

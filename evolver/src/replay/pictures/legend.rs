@@ -1,7 +1,7 @@
 //! What the colours and marks of a picture mean.
 
 use super::drawing::{Anchor, Drawing, Size};
-use super::symbols::{area_stroke, arrow, mark, over, square};
+use super::symbols::{area_stroke, arrow, mark, square};
 use super::{Look, words};
 use crate::replay::recording::Recording;
 use crate::replay::scene::{Colouring, Ink, Mark, Scene};
@@ -154,7 +154,6 @@ impl Legend {
                 Key::Robot(ink) => arrow(drawing, corner, symbol, 0, *ink),
                 Key::Mark(of) => {
                     mark(drawing, *of, corner, symbol);
-                    over(drawing, *of, corner, symbol);
                 }
                 Key::Area => {
                     let stroke = area_stroke(drawing, symbol);

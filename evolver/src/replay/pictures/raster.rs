@@ -30,7 +30,8 @@ impl Pixels {
         let tree = Tree::from_str(&drawing.svg(), &Options::default())
             .map_err(|error| PictureError::Encoding(error.to_string()))?;
         let scale = f64::from(width) / f64::from(tree.size().width());
-        let height = (f64::from(tree.size().height()) * scale).round().max(1.0);
+        // Rows that are covered wholly: of a part of one, the ground would be seen through.
+        let height = (f64::from(tree.size().height()) * scale).floor().max(1.0);
         let too_large = PictureError::TooLarge {
             width: f64::from(width),
             height,

@@ -2,7 +2,7 @@
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, line};
 use super::legend::Legend;
-use super::symbols::{area_stroke, arrow, over, square};
+use super::symbols::{area_stroke, arrow, set_off, square};
 use super::{Look, PictureError, named, symbols, words};
 use crate::replay::recording::Recording;
 use crate::replay::scene::{Colouring, Ink, Scene};
@@ -268,16 +268,15 @@ fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f64), side: 
         symbols::mark(drawing, mark.mark, corner(mark.x, mark.y), side);
     }
     for robot in &scene.robots {
-        arrow(
-            drawing,
-            corner(robot.x, robot.y),
-            side,
-            robot.heading,
-            robot.ink,
-        );
-    }
-    for mark in &scene.marks {
-        over(drawing, mark.mark, corner(mark.x, mark.y), side);
+        let at = corner(robot.x, robot.y);
+        if scene
+            .marks
+            .iter()
+            .any(|mark| (mark.x, mark.y) == (robot.x, robot.y))
+        {
+            set_off(drawing, at, side, robot.heading);
+        }
+        arrow(drawing, at, side, robot.heading, robot.ink);
     }
     if let Some(robot) = scene.picked.and_then(|robot| scene.robots.get(robot)) {
         let frame = square(corner(robot.x, robot.y), side, 0.0);

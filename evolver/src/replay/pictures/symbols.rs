@@ -7,14 +7,34 @@ use std::f64::consts::TAU;
 use svg::node::element::path::Data;
 
 /// A robot.
-pub(super) fn arrow(
-    drawing: &mut Drawing,
-    (west, north): (f64, f64),
-    side: f64,
-    heading: u8,
-    ink: Ink,
-) {
-    let corners = ARROW.map(|[x, y]| {
+pub(super) fn arrow(drawing: &mut Drawing, corner: (f64, f64), side: f64, heading: u8, ink: Ink) {
+    let outline = outline(corner, side, heading);
+    let colour = drawing.theme.ink(ink);
+    if is_hollow(ink) {
+        let stroke = Stroke {
+            colour,
+            width: (0.07 * side).max(drawing.size.hair()),
+        };
+        drawing.stroked(outline, stroke);
+    } else {
+        drawing.filled(outline, colour);
+    }
+}
+
+/// Sets a robot off from a mark under it, which may have its colour.
+pub(super) fn set_off(drawing: &mut Drawing, corner: (f64, f64), side: f64, heading: u8) {
+    let outline = outline(corner, side, heading);
+    let colour = drawing.theme.cell;
+    drawing.filled(outline.clone(), colour);
+    let stroke = Stroke {
+        colour,
+        width: 0.22 * side,
+    };
+    drawing.stroked(outline, stroke);
+}
+
+fn outline((west, north): (f64, f64), side: f64, heading: u8) -> Data {
+    polygon(&ARROW.map(|[x, y]| {
         let (ahead, right) = (x - 0.5, y - 0.5);
         let (x, y) = match heading {
             0 => (ahead, right),
@@ -23,20 +43,10 @@ pub(super) fn arrow(
             _ => (-right, ahead),
         };
         (west + (x + 0.5) * side, north + (y + 0.5) * side)
-    });
-    let colour = drawing.theme.ink(ink);
-    if is_hollow(ink) {
-        let stroke = Stroke {
-            colour,
-            width: (0.07 * side).max(drawing.size.hair()),
-        };
-        drawing.stroked(polygon(&corners), stroke);
-    } else {
-        drawing.filled(polygon(&corners), colour);
-    }
+    }))
 }
 
-/// What of a mark is under the robots.
+/// A mark, which lies under the robots so that their headings stay visible.
 pub(super) fn mark(drawing: &mut Drawing, mark: Mark, (west, north): (f64, f64), side: f64) {
     let colour = drawing.theme.mark(mark);
     let stroke = |share: f64| Stroke {
@@ -56,33 +66,19 @@ pub(super) fn mark(drawing: &mut Drawing, mark: Mark, (west, north): (f64, f64),
             drawing.stroked(ring, stroke(0.09));
         }
         Mark::ExpectsEmpty => drawing.stroked(ring((west, north), side, 0.25), stroke(0.06)),
-        Mark::MissOccupied | Mark::MissEmpty => {}
+        Mark::MissOccupied => cross(drawing, (west, north), side, stroke(0.16)),
+        Mark::MissEmpty => cross(drawing, (west, north), side, stroke(0.08)),
     }
 }
 
-/// What of a mark is over the robots.
-pub(super) fn over(drawing: &mut Drawing, mark: Mark, (west, north): (f64, f64), side: f64) {
-    let share = match mark {
-        Mark::MissOccupied => 0.16,
-        Mark::MissEmpty => 0.08,
-        _ => return,
-    };
-    let (near, far) = (0.14 * side, 0.86 * side);
+/// A cross to the corners of a cell, which a robot's arrow leaves free.
+fn cross(drawing: &mut Drawing, (west, north): (f64, f64), side: f64, stroke: Stroke<'_>) {
+    let (near, far) = (0.06 * side, 0.94 * side);
     let mut cross = line(&[(west + near, north + near), (west + far, north + far)]);
     let other = line(&[(west + near, north + far), (west + far, north + near)]);
     for command in other.iter() {
         cross.append(command.clone());
     }
-    // Set off from a robot of the same colour.
-    let around = Stroke {
-        colour: drawing.theme.cell,
-        width: (share + 0.14) * side,
-    };
-    drawing.stroked(cross.clone(), around);
-    let stroke = Stroke {
-        colour: drawing.theme.mark(mark),
-        width: share * side,
-    };
     drawing.stroked(cross, stroke);
 }
 

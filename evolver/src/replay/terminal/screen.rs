@@ -33,6 +33,7 @@ const FULL: f64 = 1000.0;
 
 /// The keys that every replay has.
 const KEYS: [(&str, &str); 8] = [
+    ("q", "quit"),
     ("space", "play"),
     ("← →", "step"),
     ("↑ ↓", "ten"),
@@ -40,7 +41,6 @@ const KEYS: [(&str, &str); 8] = [
     ("+ -", "speed"),
     ("n p", "robot"),
     ("c", "colour"),
-    ("q", "quit"),
 ];
 
 /// Draws everything.
@@ -498,9 +498,17 @@ mod tests {
             "                 ▷ none",
             "",
             " paused   10/s  step 1 of 2  ━━━━━━━━━━━━━━━━━━━━━━━━━──────────────────────────",
-            " space play  ← → step  ↑ ↓ ten  0–9 seek  + - speed  n p robot  c colour  q quit",
+            " q quit  space play  ← → step  ↑ ↓ ten  0–9 seek  + - speed  n p robot  c colour",
         ];
         assert_eq!(screen(&mut player, 80, 18), expected);
+    }
+
+    #[test]
+    fn a_window_of_60_columns_says_how_to_quit() {
+        let recording = recording();
+        let mut player = Player::new(&recording, Colouring::Plain);
+        let keys = screen(&mut player, 60, 18).pop();
+        assert!(keys.is_some_and(|keys| keys.contains("q quit  space play")));
     }
 
     #[test]
