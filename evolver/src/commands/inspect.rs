@@ -8,7 +8,7 @@ use std::path::Path;
 /// Shows a genome file, or that of a run directory.
 ///
 /// # Errors
-/// [`BadInput`] if the file cannot be read or is not a genome for this program.
+/// [`BadInput`](super::BadInput) if the file cannot be read or is not a genome for this program.
 pub fn inspect(path: &Path) -> anyhow::Result<()> {
     let bytes = read_genome(path)?;
     let encoded = EncodedGenome::decode(&bytes)?;

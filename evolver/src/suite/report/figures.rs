@@ -129,7 +129,8 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
         figures.push(temperature(
             name(
                 5,
-                "Temperature over time at even steps; medians red, bands of quartiles and extremes grey",
+                "Temperature over time: box plots at every even step, drawn as \
+                 bands; extremes light, quartiles dark, medians red",
             ),
             &groups,
         )?);
