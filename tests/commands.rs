@@ -472,7 +472,7 @@ fn an_exported_genome_has_the_same_bytes_in_c_and_rust() {
         let run = evolver.run(&arguments);
         assert_eq!(run.code, Some(0), "{run:?}");
         let again = evolver.run(&arguments);
-        assert_refused(&again, &[&format!("--out = {name}"), "File exists"]);
+        assert_refused(&again, &[&format!("--out = {name}"), "it exists"]);
     }
     evolver.write(
         "printer.c",
@@ -623,6 +623,6 @@ fn export_refuses_what_is_no_genome_and_where_it_does_not_fit() {
     );
     refused(
         "export run/best.genome --format trajectory",
-        &["holds no complete run"],
+        &["of a run directory"],
     );
 }
