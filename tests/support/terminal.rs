@@ -144,6 +144,21 @@ impl Terminal {
         self.wait_until(words, false);
     }
 
+    /// Waits until this holds of the screen, which arrives in pieces.
+    ///
+    /// # Panics
+    /// If it does not in time.
+    pub fn wait_until_it_shows(&mut self, what: &str, holds: impl Fn(&Self) -> bool) {
+        let started = Instant::now();
+        while !holds(self) {
+            let left = PATIENCE.saturating_sub(started.elapsed());
+            match self.output.recv_timeout(left) {
+                Ok(bytes) => self.parser.process(&bytes),
+                Err(error) => panic!("no {what}, {error}:\n{}", self.screen().contents()),
+            }
+        }
+    }
+
     fn wait_until(&mut self, words: &str, shown: bool) {
         let started = Instant::now();
         while self.screen().contents().contains(words) != shown {
