@@ -2,8 +2,8 @@
 //! directories, and the command line `evolver`.
 //!
 //! Data flows one way: [`settings`] → [`evolution`] → [`experiment`] → [`checkpoint`],
-//! [`finished_run`] and [`run_dir`] → [`reevaluation`] and [`hil`] → [`report`] → [`commands`] →
-//! [`cli`]. Beside it: [`robot`], a robot on a serial line.
+//! [`finished_run`] and [`run_dir`] → [`reevaluation`], [`hil`], [`replay`] and [`suite`] →
+//! [`report`] → [`commands`] → [`cli`]. Beside it: [`robot`], a robot on a serial line.
 #![forbid(unsafe_code)]
 
 #[macro_use]
