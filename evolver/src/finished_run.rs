@@ -1,8 +1,9 @@
 //! Reading a complete run directory back: the genome, where it started from, where it ended.
 
-use crate::files::{self, FileError};
+use crate::files::{self, DATA_BYTES_MAX, FileError, TEXT_BYTES_MAX};
 use crate::settings::{Given, SettingError, Settings};
 use crate::steps_hash::StepsHash;
+use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_controller::{Controller, DecodeError, EncodedGenome, Genome, Provenance};
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::metrics::Measures;
@@ -230,7 +231,7 @@ pub fn parse_final_state(path: &Path, bytes: &[u8]) -> Result<FinalState, StateE
 }
 
 fn best_fitness(path: &Path) -> Result<Vec<f64>, ReadRunError> {
-    csv::Reader::from_reader(files::read(path)?.as_slice())
+    csv::Reader::from_reader(files::read(path, DATA_BYTES_MAX)?.as_slice())
         .deserialize()
         .map(|line| line.map(|line: GenerationLine| line.best_fitness))
         .collect::<Result<_, _>>()
@@ -271,7 +272,10 @@ pub fn is_complete(path: &Path) -> Result<bool, ReadRunError> {
         all_there(path, &FILES)?;
         all_there(path, &["meta.json"])?;
         let state = path.join("final.json");
-        Ok(check_version(&state, &files::read(&state)?)?)
+        Ok(check_version(
+            &state,
+            &files::read(&state, DATA_BYTES_MAX)?,
+        )?)
     };
     look()
         .map(|()| true)
@@ -324,13 +328,13 @@ impl FinishedRun {
         given.forget("from");
         let settings = Settings::resolve(&given, || 0)?;
         let genome_path = path.join("best.genome");
-        let bytes = files::read(&genome_path)?;
+        let bytes = files::read(&genome_path, CONTAINER_BYTES_MAX as u64)?;
         let encoded = EncodedGenome::decode(&bytes).map_err(|error| ReadRunError::Genome {
             path: genome_path,
             error,
         })?;
         let state_path = path.join("final.json");
-        let state = parse_final_state(&state_path, &files::read(&state_path)?)?;
+        let state = parse_final_state(&state_path, &files::read(&state_path, DATA_BYTES_MAX)?)?;
         let inconsistent = |problem| {
             Err(ReadRunError::Inconsistent {
                 path: path.to_owned(),
@@ -351,7 +355,7 @@ impl FinishedRun {
                 "generations.csv has another number of lines than config.toml has generations",
             );
         }
-        let hash = files::read(&path.join("DONE"))?;
+        let hash = files::read(&path.join("DONE"), TEXT_BYTES_MAX)?;
         Ok(Self {
             genome: encoded.to_genome(),
             provenance: encoded.provenance(),

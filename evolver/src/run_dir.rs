@@ -15,7 +15,7 @@
 
 use crate::checkpoint::{self, CheckpointError};
 use crate::experiment::{Experiment, Finding};
-use crate::files::{self, FileError};
+use crate::files::{self, DATA_BYTES_MAX, FileError, TEXT_BYTES_MAX};
 use crate::finished_run::{ReadRunError, is_complete};
 use crate::report::tables;
 use crate::settings::{Given, SettingError, Settings};
@@ -199,8 +199,9 @@ impl RunDir {
         // The first population is in the checkpoint; its ancestor need not exist any more.
         given.forget("from");
         let settings = Settings::resolve(&given, || 0)?;
-        let settings_text = String::from_utf8_lossy(&files::read(&config)?).into_owned();
-        let bytes = files::read(&checkpoint)?;
+        let settings_text =
+            String::from_utf8_lossy(&files::read(&config, TEXT_BYTES_MAX)?).into_owned();
+        let bytes = files::read(&checkpoint, DATA_BYTES_MAX)?;
         let experiment = checkpoint::decode(&bytes, settings, &settings_text).map_err(|error| {
             RunDirError::Checkpoint {
                 path: checkpoint,
@@ -208,7 +209,7 @@ impl RunDir {
             }
         })?;
         // A run from before there was such a file has none.
-        let spent = fs::read(path.join(TIME))
+        let spent = files::read(&path.join(TIME), TEXT_BYTES_MAX)
             .map_or_else(|_| TimeSpent::default(), |bytes| TimeSpent::of_json(&bytes));
         let run = Self {
             path: path.to_owned(),
@@ -298,7 +299,7 @@ fn finished(directory: &Path) -> Result<Option<String>, RunDirError> {
         return Ok(None);
     }
     let done = directory.join(DONE);
-    let hash = files::read(&done)?;
+    let hash = files::read(&done, TEXT_BYTES_MAX)?;
     // It is only in the way of the eye, and the directory need not be ours.
     let _ = tidy(directory);
     Ok(Some(String::from_utf8_lossy(&hash).trim().to_owned()))

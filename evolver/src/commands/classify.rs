@@ -1,7 +1,7 @@
 //! `evolver classify`: what a swarm formed, and how the run went.
 
 use super::BadInput;
-use crate::files;
+use crate::files::{self, DATA_BYTES_MAX};
 use crate::finished_run::{FinishedRun, parse_final_state};
 use crate::report::structures::{self, Classified};
 use minimal_surprise_sim::exchange::Trajectory;
@@ -41,7 +41,7 @@ pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
 
 /// The last state in a file, by what the file starts with.
 fn read_state(path: &Path) -> Result<(Grid, Vec<Pose>), BadInput> {
-    let bytes = files::read(path).map_err(BadInput::new)?;
+    let bytes = files::read(path, DATA_BYTES_MAX).map_err(BadInput::new)?;
     let text = std::str::from_utf8(&bytes).map_err(|_| {
         BadInput::new(format!(
             "{}: neither a final.json, nor an agent_trajectory, nor a drawing",

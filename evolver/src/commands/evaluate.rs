@@ -7,6 +7,7 @@ use crate::report::reevaluation::{Condition, conditions_json, conditions_text};
 use crate::settings::{Given, Settings, count, parse_grid, probability};
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
+use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_sim::{NoiseRate, Scenario, SeedTree};
 use std::path::{Path, PathBuf};
 
@@ -54,7 +55,7 @@ pub struct EvaluateArgs {
 pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     let file = genome_file(&arguments.genome);
     let path = file.display();
-    let bytes = files::read(&file).map_err(BadInput::new)?;
+    let bytes = files::read(&file, CONTAINER_BYTES_MAX as u64).map_err(BadInput::new)?;
     let run = conditions_beside(&file)?;
     let or_of_run = |given: &Option<String>, of_run: fn(&Settings) -> String, default: &str| {
         let of_run = || run.as_ref().map(of_run);

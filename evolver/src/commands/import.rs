@@ -2,7 +2,7 @@
 
 use super::BadInput;
 use super::evaluate::flag;
-use crate::files;
+use crate::files::{self, DATA_BYTES_MAX};
 use crate::settings::{Given, describe, resolve_topology};
 use clap::Args;
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
@@ -104,7 +104,7 @@ pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
 }
 
 fn read(path: &Path) -> Result<Vec<GenomeRows>, BadInput> {
-    let bytes = files::read(path).map_err(BadInput::new)?;
+    let bytes = files::read(path, DATA_BYTES_MAX).map_err(BadInput::new)?;
     read_genomes(&String::from_utf8_lossy(&bytes))
         .map_err(|error: ExchangeError| BadInput::new(format!("{}, {error}", path.display())))
 }

@@ -22,6 +22,7 @@ use crate::robot::PortName;
 use crate::settings::count;
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
+use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use std::path::{Path, PathBuf};
 
 /// Input that cannot be used, in one message.
@@ -81,7 +82,7 @@ fn genome_file(path: &Path) -> PathBuf {
 /// this program.
 fn read_genome(path: &Path) -> Result<Vec<u8>, BadInput> {
     let path = &genome_file(path);
-    let bytes = files::read(path).map_err(BadInput::new)?;
+    let bytes = files::read(path, CONTAINER_BYTES_MAX as u64).map_err(BadInput::new)?;
     match EncodedGenome::decode(&bytes) {
         Ok(_) => Ok(bytes),
         Err(error) => Err(BadInput::new(format!("{}: {error}", path.display()))),

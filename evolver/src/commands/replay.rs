@@ -5,7 +5,7 @@ use super::damage::corners;
 use super::evaluate::flag;
 use super::pictures::PictureArgs;
 use super::{BadInput, read_genome};
-use crate::files;
+use crate::files::{self, DATA_BYTES_MAX};
 use crate::finished_run::FinishedRun;
 use crate::replay::page::page;
 use crate::replay::recording::{Origin, Recording};
@@ -161,7 +161,7 @@ fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {
             )));
         }
     }
-    let bytes = files::read(path).map_err(BadInput::new)?;
+    let bytes = files::read(path, DATA_BYTES_MAX).map_err(BadInput::new)?;
     match std::str::from_utf8(&bytes) {
         Ok(text) if text.trim_start_matches('\u{feff}').starts_with("Gen:") => {
             conditions.refuse_beside("a trajectory", path)?;

@@ -2,7 +2,7 @@
 
 use super::damage_areas::{Rectangle, smallest_apart};
 use super::{ReportError, plural};
-use crate::files;
+use crate::files::{self, DATA_BYTES_MAX, TEXT_BYTES_MAX};
 use crate::finished_run::{FinishedRun, ReadRunError};
 use crate::reevaluation::{ResilienceRow, after_damage, mean, rerun, resilience};
 use crate::settings::Settings;
@@ -424,7 +424,7 @@ fn read_run(planned: &PlannedRun, directory: &Path) -> Result<Option<Run>, Repor
     let state: FinalFile = json(&directory.join("final.json"))?;
     let meta: MetaFile = json(&directory.join("meta.json"))?;
     // Nothing of what is said depends on it; a run of an older program has none.
-    let time = files::read(&directory.join("time.json")).unwrap_or_default();
+    let time = files::read(&directory.join("time.json"), TEXT_BYTES_MAX).unwrap_or_default();
     let found = classify(finished.settings.scenario.grid(), &finished.final_poses)?;
     Ok(Some(Run {
         id: planned.id.clone(),
@@ -446,7 +446,7 @@ fn read_run(planned: &PlannedRun, directory: &Path) -> Result<Option<Run>, Repor
 }
 
 fn json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, ReportError> {
-    serde_json::from_slice(&files::read(path)?).map_err(|error| ReportError::Json {
+    serde_json::from_slice(&files::read(path, DATA_BYTES_MAX)?).map_err(|error| ReportError::Json {
         path: path.to_owned(),
         error,
     })

@@ -17,7 +17,7 @@ pub mod tables;
 
 use super::Suite;
 use super::plan::Plan;
-use crate::files::{self, FileError};
+use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::finished_run::ReadRunError;
 use crate::report::progress::seconds;
 use crate::time_spent::TimeSpent;
@@ -223,7 +223,7 @@ pub fn write(
     report.has_gallery = out.join(GALLERY).join("index.html").is_file();
     let looked_into = out.join(LOOKED_INTO);
     if looked_into.is_file() {
-        let text = files::read(&looked_into)?;
+        let text = files::read(&looked_into, TEXT_BYTES_MAX)?;
         let text = String::from_utf8_lossy(&text);
         report.looked_into = text.lines().map(str::to_owned).collect();
     }
