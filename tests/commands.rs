@@ -619,7 +619,7 @@ fn export_refuses_what_is_no_genome_and_where_it_does_not_fit() {
     );
     refused(
         "export run/best.genome --format slot --write-count 0 --out out",
-        &["--write-count = 0", "from 1 to 4294967295"],
+        &["--write-count = 0", "from 1 to 4278190079"],
     );
     refused(
         "export run/best.genome --format trajectory",

@@ -835,6 +835,7 @@ fn value_stability_every_message() {
         (Refusal::BadGenome, "05 06"),
         (Refusal::Flash, "05 07"),
         (Refusal::Unsupported, "05 08"),
+        (Refusal::CountExhausted, "05 09"),
     ];
     replies.extend(refusals.map(|(refusal, hex)| (Reply::Refused(refusal), hex.into())));
     for (body, expected) in replies {

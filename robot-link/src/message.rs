@@ -266,6 +266,13 @@ pub enum Refusal {
     /// This robot cannot do that.
     #[error("the robot cannot do that")]
     Unsupported,
+    /// The slots' write count has reached its end. Robots of firmware before this variant answer
+    /// [`Refusal::Flash`].
+    #[error(
+        "the robot's count of genomes written has reached its end, so that it takes no more over \
+         the line; erase both of its genome slots with a debug probe, and it counts from 1 again"
+    )]
+    CountExhausted,
 }
 
 /// A frame whose CRC is right, but not of this protocol.

@@ -13,6 +13,9 @@ pub const CONTAINER_AT: u32 = 2 * BLOCK_BYTES as u32;
 pub const ROOM_BYTES: usize = CONTAINER_BYTES_MAX.next_multiple_of(BLOCK_BYTES);
 /// Bytes of a slot, before rounding up to whole erase units.
 pub const SLOT_BYTES_MIN: usize = CONTAINER_AT as usize + ROOM_BYTES;
+/// Largest write count to give a slot that is made outside the robot: the updates that it leaves,
+/// 2²⁴, are more than any flash endures.
+pub const MADE_WRITE_COUNT_MAX: u32 = u32::MAX - (1 << 24);
 /// First bytes of a slot; the last one is the version of the layout.
 pub const MAGIC: [u8; 4] = *b"MSS1";
 

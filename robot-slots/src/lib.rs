@@ -41,7 +41,8 @@ mod room;
 
 pub use error::{Defect, PlaceError, UpdateError};
 pub use layout::{
-    BLOCK_BYTES, COMMIT_AT, CONTAINER_AT, Header, MAGIC, ROOM_BYTES, SLOT_BYTES_MIN, slot_bytes,
+    BLOCK_BYTES, COMMIT_AT, CONTAINER_AT, Header, MADE_WRITE_COUNT_MAX, MAGIC, ROOM_BYTES,
+    SLOT_BYTES_MIN, slot_bytes,
 };
 pub use room::{Buffer, InPlace, MappedFlash, Room};
 

@@ -5,9 +5,11 @@ use super::replay::exists;
 use super::{BadInput, genome_file, read_genome};
 use crate::finished_run::FinishedRun;
 use crate::report::embedding::{c_header, intel_hex, probe_rs_line, rust_source, slot};
+use crate::settings::count;
 use clap::{Args, ValueEnum};
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::exchange::Trajectory;
+use minimal_surprise_slots::MADE_WRITE_COUNT_MAX;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::PathBuf;
@@ -72,7 +74,10 @@ pub enum Format {
 /// [`BadInput`] if genome or run cannot be read or the file exists.
 pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
     let address = flag("address", &arguments.address, memory_address)?;
-    let write_count = flag("write-count", &arguments.write_count, count_from_1)?;
+    // Enough counts are left that the robot can always be updated over its line.
+    let write_count = flag("write-count", &arguments.write_count, |text| {
+        count(text, MADE_WRITE_COUNT_MAX)
+    })?;
     let bytes = match arguments.format {
         Format::Trajectory => trajectory(arguments)?,
         format => genome(arguments, format, address, write_count)?,
@@ -151,14 +156,6 @@ fn genome(
         Format::Slot => slot(&container, write_count),
         Format::Bin | Format::Trajectory => container,
     })
-}
-
-/// From 1 on: no slot is written as the zeroth.
-fn count_from_1(text: &str) -> Result<u32, String> {
-    match text.parse() {
-        Ok(count @ 1..) => Ok(count),
-        _ => Err("expected a number from 1 to 4294967295".to_owned()),
-    }
 }
 
 /// An address, decimal or hexadecimal.

@@ -264,9 +264,9 @@ pub fn refusal<E: core::fmt::Debug>(error: &UpdateError<E>) -> Refusal {
         UpdateError::Defect(Defect::OtherContainer { .. } | Defect::Refused(_)) => {
             Refusal::BadGenome
         }
+        UpdateError::CountExhausted => Refusal::CountExhausted,
         UpdateError::Flash(_)
         | UpdateError::NotWritten
-        | UpdateError::CountExhausted
         | UpdateError::Defect(Defect::Unreadable) => Refusal::Flash,
     }
 }
