@@ -125,14 +125,14 @@ say "the robot's firmware for both of its boards"
     ../scripts/thumb-cargo.sh build --locked --release --package robot-stm32f4)
 
 say 'packages'
-cargo package --locked --workspace --exclude tests --allow-dirty --no-verify
+cargo package --locked --workspace --exclude tests --exclude robot-support --allow-dirty --no-verify
 
 say 'tests'
 # shellcheck disable=SC2086 # an option and its value
 cargo test --locked --workspace --all-features -- --show-output $without_slurm
 if [ -n "${TEST_ALL:-}" ]; then
     say 'every power cut after every power cut'
-    cargo test --locked --release --package tests --test power_cuts -- --show-output
+    cargo test --locked --release --package minimal-surprise-slots --test power_cuts -- --show-output
 fi
 
 say 'everything passed'

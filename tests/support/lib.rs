@@ -2,11 +2,8 @@
 
 pub mod browser;
 pub mod firmware;
-pub mod flash;
-pub mod full;
 pub mod genome;
 pub mod golden;
-pub mod link_robot;
 pub mod program;
 #[cfg(target_os = "linux")]
 pub mod pty;
@@ -15,3 +12,5 @@ pub mod structures;
 #[cfg(unix)]
 pub mod terminal;
 pub mod tools;
+
+pub use robot_support::{flash, full, link_robot};

@@ -950,7 +950,7 @@ fn errors_are_found_in_the_order_of_the_format() {
 }
 
 /// The example of `docs/genome-format.md`.
-static FIXTURE: &[u8] = include_bytes!("fixtures/genomes/b-predefined-line.genome");
+static FIXTURE: &[u8] = include_bytes!("b-predefined-line.genome");
 
 /// What the fixture holds: sensor model B, predefined line, weights from ChaCha8 seeded with 2020.
 fn fixture() -> (Genome, Provenance) {
@@ -986,7 +986,7 @@ fn value_stability_decode() {
 
 #[test]
 fn the_example_of_the_documentation_is_the_fixture() {
-    let page = include_str!("../docs/genome-format.md");
+    let page = include_str!("../../docs/genome-format.md");
     for (line, bytes) in FIXTURE.chunks(16).enumerate() {
         let hex: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
         let (left, right) = hex.split_at(hex.len().min(8));

@@ -20,10 +20,10 @@ use minimal_surprise_link::{
 use minimal_surprise_slots::{Buffer, InUse, crc_of};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
+use robot_support::full::all_cases;
+use robot_support::link_robot::{Flash, LinkRobot};
 use serde::Serialize;
 use std::collections::VecDeque;
-use tests::full::all_cases;
-use tests::link_robot::{Flash, LinkRobot};
 
 /// Seed unless `LINK_SEED` says otherwise.
 const SEED: u64 = 11;
@@ -49,7 +49,9 @@ impl Drop for Replay {
     fn drop(&mut self) {
         if std::thread::panicking() {
             let Self { test, seed } = self;
-            eprintln!("again: LINK_SEED={seed} cargo test -p tests --test link {test}");
+            eprintln!(
+                "again: LINK_SEED={seed} cargo test -p minimal-surprise-link --test link {test}"
+            );
         }
     }
 }

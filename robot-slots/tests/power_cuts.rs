@@ -15,10 +15,10 @@ use minimal_surprise_slots::{
 };
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
+use robot_support::flash::{MockFlash, PowerCut};
+use robot_support::full::all_cases;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
-use tests::flash::{MockFlash, PowerCut};
-use tests::full::all_cases;
 
 /// Seed of the genomes.
 const SEED: u64 = 5;
@@ -145,7 +145,7 @@ impl Drop for Case {
             let second = self.second.map_or("-".into(), |second| second.to_string());
             eprintln!(
                 "genome seed {SEED}; this case again: \
-                 POWER_CUT={write_size}:{erase_size}:{first}:{second} cargo test -p tests --test power_cuts"
+                 POWER_CUT={write_size}:{erase_size}:{first}:{second} cargo test -p minimal-surprise-slots --test power_cuts"
             );
         }
     }

@@ -1,0 +1,37 @@
+#!/bin/sh
+# Mutation tests of controller, slots and link: scripts/mutants.sh [SHARDS]. Takes an hour or two,
+# and cargo-mutants (cargo install cargo-mutants --locked).
+#
+# The outcomes are in target/mutants. Started again, it goes on behind the last complete shard;
+# for other sources, or other tests, remove that directory first.
+set -eu
+cd "$(dirname "$0")/.."
+
+shards=${1:-16}
+outcomes=target/mutants/outcomes
+# One for all shards, so that dependencies are compiled once.
+CARGO_TARGET_DIR=$PWD/target/mutants/build
+export CARGO_TARGET_DIR
+
+shard=0
+while [ "$shard" -lt "$shards" ]; do
+    this=$outcomes/$shard-of-$shards
+    if [ ! -e "$this/complete" ]; then
+        mkdir -p "$this"
+        status=0
+        nice cargo mutants --package minimal-surprise-controller --package minimal-surprise-slots \
+            --package minimal-surprise-link --shard "$shard/$shards" --sharding round-robin \
+            --output "$this" || status=$?
+        # 2: mutants have survived. 3: tests have taken too long, which counts as caught.
+        case $status in
+            0 | 2 | 3) touch "$this/complete" ;;
+            *) exit "$status" ;;
+        esac
+    fi
+    shard=$((shard + 1))
+done
+
+for outcome in caught timeout unviable missed; do
+    echo "$outcome: $(cat "$outcomes"/*-of-"$shards"/mutants.out/$outcome.txt | wc -l)"
+done
+cat "$outcomes"/*-of-"$shards"/mutants.out/missed.txt
