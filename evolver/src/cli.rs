@@ -1,11 +1,11 @@
 //! The command line: parse and hand over to a command.
 
-use crate::commands::BadInput;
 use crate::commands::bench::bench;
 use crate::commands::classify::classify;
 use crate::commands::damage::{DamageArgs, damage};
 use crate::commands::evaluate::{EvaluateArgs, evaluate};
 use crate::commands::evolve::{EvolveArgs, evolve};
+use crate::commands::exit_of;
 use crate::commands::export::{ExportArgs, export};
 use crate::commands::flash::{FlashArgs, flash};
 use crate::commands::gallery::{GalleryArgs, gallery};
@@ -15,13 +15,11 @@ use crate::commands::inspect::inspect;
 use crate::commands::monitor::{MonitorArgs, monitor};
 use crate::commands::replay::{ReplayArgs, replay};
 use crate::commands::suite::{SuiteArgs, TaskArgs, Verb, paper, run_task, suite};
-use crate::run_dir::RunDirError;
-use clap::{CommandFactory, Parser, Subcommand};
+use crate::exit::Exit;
+use crate::output;
+use clap::{ColorChoice, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
-
-/// Exit code for input that cannot be used; nothing has been written.
-const EXIT_BAD_INPUT: u8 = 2;
 
 /// Evolves swarms of robots that minimise surprise, on the arithmetic that the robots run.
 ///
@@ -94,8 +92,37 @@ enum Command {
 /// Runs the program with the process's arguments.
 #[must_use]
 pub fn main() -> ExitCode {
-    let done = |()| ExitCode::SUCCESS;
-    let result = match Cli::parse().command {
+    output::start();
+    let exit = run(arguments()).unwrap_or_else(|error| {
+        tell!("error: {error:#}");
+        exit_of(&error)
+    });
+    exit.into()
+}
+
+/// The arguments; ends the program where they are wrong, or ask for help.
+fn arguments() -> Cli {
+    let colours = match output::terminal_has_codes() {
+        true => ColorChoice::Auto,
+        false => ColorChoice::Never,
+    };
+    let matches = Cli::command().color(colours).try_get_matches();
+    let parsed = matches.and_then(|matches| Cli::from_arg_matches(&matches));
+    parsed.unwrap_or_else(|error| {
+        let printed = error.print();
+        if error.use_stderr() {
+            Exit::BadInput.now();
+        }
+        match printed {
+            Ok(()) => Exit::Done.now(),
+            Err(error) => output::end(&error),
+        }
+    })
+}
+
+fn run(arguments: Cli) -> anyhow::Result<Exit> {
+    let done = |()| Exit::Done;
+    match arguments.command {
         None => evolve(&EvolveArgs::default()),
         Some(Command::Evolve(arguments)) => evolve(&arguments),
         Some(Command::Bench { json }) => bench(json).map(done),
@@ -114,17 +141,10 @@ pub fn main() -> ExitCode {
         Some(Command::Suite(arguments)) => suite(&arguments),
         Some(Command::RunTask(arguments)) => run_task(&arguments),
         Some(Command::Completions { shell }) => {
-            let mut stdout = std::io::stdout();
-            clap_complete::generate(shell, &mut Cli::command(), "evolver", &mut stdout);
-            Ok(ExitCode::SUCCESS)
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "evolver", &mut script);
+            output::write_bytes(&script);
+            Ok(Exit::Done)
         }
-    };
-    result.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
-        let bad_input = error.is::<BadInput>()
-            || error
-                .downcast_ref::<RunDirError>()
-                .is_some_and(RunDirError::is_bad_input);
-        ExitCode::from(if bad_input { EXIT_BAD_INPUT } else { 1 })
-    })
+    }
 }

@@ -1,35 +1,200 @@
-//! Standard output, where the reader may have gone: `evolver classify RUN | head` is no error.
+//! The one way to standard output and standard error.
+//!
+//! Whoever reads them may go away, and the disk behind them may be full. A report without a reader
+//! ends quietly: `evolver classify RUN | head` is no error. Work goes on to a place from which it
+//! can be resumed ([`event`]). What cannot be said on standard error is not said.
+//!
+//! Files and pipes get UTF-8; a terminal gets what its locale can show.
 
+use crate::exit::Exit;
+use crate::signals;
+use std::borrow::Cow;
+use std::env;
 use std::fmt::Arguments;
-use std::io::{ErrorKind, Write, stdout};
+use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdout};
+use std::sync::{LazyLock, OnceLock};
 
-/// Writes to standard output; ends the program quietly if nobody reads it any more.
-pub(crate) fn write(text: Arguments<'_>) {
+/// Looked at once, at the start: a terminal that was closed is none any more.
+static STDOUT_IS_TERMINAL: LazyLock<bool> = LazyLock::new(|| stdout().is_terminal());
+static STDERR_IS_TERMINAL: LazyLock<bool> = LazyLock::new(|| stderr().is_terminal());
+static LOCALE_IS_UTF8: LazyLock<bool> = LazyLock::new(locale_is_utf8);
+
+/// Why an event could not be written.
+static LOST: OnceLock<io::Error> = OnceLock::new();
+
+/// Looks at the terminals, and takes the colours away from those that have none.
+pub(crate) fn start() {
+    LazyLock::force(&STDOUT_IS_TERMINAL);
+    LazyLock::force(&STDERR_IS_TERMINAL);
+    if !terminal_has_codes() {
+        console::set_colors_enabled(false);
+        console::set_colors_enabled_stderr(false);
+    }
+}
+
+/// Whether a terminal understands codes that move its cursor and change its colours.
+pub(crate) fn terminal_has_codes() -> bool {
+    let named = |term: &std::ffi::OsString| !term.is_empty() && term != "dumb";
+    cfg!(windows) || env::var_os("TERM").as_ref().is_some_and(named)
+}
+
+/// Whether standard output is a terminal that can be drawn on.
+pub(crate) fn stdout_is_screen() -> bool {
+    *STDOUT_IS_TERMINAL && terminal_has_codes()
+}
+
+/// Whether standard error is a terminal that can be drawn on.
+pub(crate) fn stderr_is_screen() -> bool {
+    *STDERR_IS_TERMINAL && terminal_has_codes()
+}
+
+/// Whether standard output is a terminal whose locale knows ASCII only.
+pub(crate) fn stdout_is_ascii() -> bool {
+    *STDOUT_IS_TERMINAL && !*LOCALE_IS_UTF8
+}
+
+/// Whether standard error is a terminal whose locale knows ASCII only.
+pub(crate) fn stderr_is_ascii() -> bool {
+    *STDERR_IS_TERMINAL && !*LOCALE_IS_UTF8
+}
+
+fn locale_is_utf8() -> bool {
+    let set = |name| env::var_os(name).filter(|value| !value.is_empty());
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set);
+    let locale = locale.unwrap_or_default().to_string_lossy().to_lowercase();
+    cfg!(windows) || locale.contains("utf-8") || locale.contains("utf8")
+}
+
+/// The text as a terminal without UTF-8 can show it.
+pub(crate) fn ascii(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for letter in text.chars() {
+        let like = match letter {
+            letter if letter.is_ascii() => {
+                shown.push(letter);
+                continue;
+            }
+            '▶' | '▷' | '▸' => ">",
+            '▲' | '△' | '▴' => "^",
+            '◀' | '◁' | '◂' => "<",
+            '▼' | '▽' | '▾' => "v",
+            '·' => ".",
+            '–' | '—' | '−' | '─' => "-",
+            '━' => "=",
+            '…' => "...",
+            '×' => "x",
+            '✘' => "X",
+            '■' | '█' => "#",
+            '□' => "+",
+            '●' => "@",
+            '○' => "o",
+            '░' => ":",
+            '←' => "<",
+            '→' => ">",
+            '↑' => "^",
+            '↓' => "v",
+            '▁' => "_",
+            '▂' => ".",
+            '▃' => "-",
+            '▄' => "=",
+            '▅' => "+",
+            '▆' => "*",
+            '▇' => "%",
+            '⁰'..='⁹' | '²' | '³' | '¹' => "^",
+            _ => {
+                shown.extend(letter.escape_unicode());
+                continue;
+            }
+        };
+        shown.push_str(like);
+    }
+    shown
+}
+
+/// The text as standard error shows it.
+pub(crate) fn for_stderr(text: &str) -> Cow<'_, str> {
+    if stderr_is_ascii() {
+        ascii(text).into()
+    } else {
+        text.into()
+    }
+}
+
+/// Writes to standard output. What to do about an error is for the caller to say.
+pub(crate) fn try_write(text: Arguments<'_>) -> io::Result<()> {
     let mut stdout = stdout();
-    check(stdout.write_fmt(text).and_then(|()| stdout.flush()));
+    if stdout_is_ascii() {
+        stdout.write_all(ascii(&text.to_string()).as_bytes())?;
+    } else {
+        stdout.write_fmt(text)?;
+    }
+    stdout.flush()
+}
+
+/// Writes a report to standard output; ends the program if that fails.
+pub(crate) fn write(text: Arguments<'_>) {
+    try_write(text).unwrap_or_else(|error| end(&error));
 }
 
 /// The same for bytes.
 pub(crate) fn write_bytes(bytes: &[u8]) {
     let mut stdout = stdout();
-    check(stdout.write_all(bytes).and_then(|()| stdout.flush()));
+    let written = stdout.write_all(bytes).and_then(|()| stdout.flush());
+    written.unwrap_or_else(|error| end(&error));
 }
 
-fn check(written: std::io::Result<()>) {
-    match written {
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
-        Err(error) => {
-            eprintln!("error: standard output: {error}");
-            std::process::exit(1);
-        }
-        Ok(()) => {}
+/// Ends the program: quietly, if nobody reads standard output any more.
+pub(crate) fn end(error: &io::Error) -> ! {
+    if is_gone(error) {
+        Exit::Done.now();
+    }
+    tell(format_args!("error: standard output: {error}\n"));
+    Exit::Failure.now()
+}
+
+/// Writes to standard output while there is work to do. If that fails, the work is asked to stop
+/// where it can be resumed, and [`lost`] says why.
+pub(crate) fn event(text: Arguments<'_>) {
+    if let Err(error) = try_write(text) {
+        // The first error is the one that counts.
+        let _ = LOST.set(error);
+        signals::ask_to_stop();
     }
 }
 
+/// Why the work was asked to stop, if standard output is the reason.
+pub(crate) fn lost() -> Option<&'static io::Error> {
+    LOST.get()
+}
+
+/// Whether nobody reads standard output any more; a terminal fails in no other way.
+pub(crate) fn is_gone(error: &io::Error) -> bool {
+    error.kind() == ErrorKind::BrokenPipe || *STDOUT_IS_TERMINAL
+}
+
+/// Writes to standard error. Nobody could be told that it failed.
+pub(crate) fn tell(text: Arguments<'_>) {
+    // In one piece: other processes write there, too.
+    let text = text.to_string();
+    let _ = stderr().write_all(for_stderr(&text).as_bytes());
+}
+
+/// Writes a report, or a part of it, to standard output.
 macro_rules! show {
     ($($text:tt)*) => { $crate::output::write(format_args!($($text)*)) };
 }
 
+/// Writes a line of a report to standard output.
 macro_rules! show_line {
     ($($text:tt)*) => { $crate::output::write(format_args!("{}\n", format_args!($($text)*))) };
+}
+
+/// Writes a line to standard output while there is work to do.
+macro_rules! show_event {
+    ($($text:tt)*) => { $crate::output::event(format_args!("{}\n", format_args!($($text)*))) };
+}
+
+/// Writes a line to standard error.
+macro_rules! tell {
+    ($($text:tt)*) => { $crate::output::tell(format_args!("{}\n", format_args!($($text)*))) };
 }

@@ -12,7 +12,7 @@ pub fn bench(json: bool) -> anyhow::Result<()> {
     let path = Path::from_environment().map_err(BadInput::new)?;
     let report = bench::run(path, |what| {
         if !json {
-            eprintln!("measuring: {what}");
+            tell!("measuring: {what}");
         }
     })?;
     if json {

@@ -1,8 +1,9 @@
 //! `evolver evolve`: evolve a swarm, or go on with a run.
 
 use super::replay::in_terminal;
-use super::{BadInput, thread_pool};
+use super::{BadInput, stopped, thread_pool};
 use crate::evolving::until_finished;
+use crate::exit::Exit;
 use crate::experiment::Experiment;
 use crate::finished_run::FinishedRun;
 use crate::replay::recording::Recording;
@@ -12,15 +13,11 @@ use crate::report::progress::{Progress, ProgressMode};
 use crate::report::summary;
 use crate::run_dir::{Found, RunDir};
 use crate::settings::{self, Given, SettingError, Settings};
+use crate::signals::stop_on_signal;
 use clap::{Args, ValueEnum};
 use minimal_surprise_sim::{Engine, Path as CodePath};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Exit code after Ctrl-C.
-const EXIT_INTERRUPTED: u8 = 130;
+use std::sync::atomic::AtomicBool;
 
 /// Settings as flags; a file has the same names. Defaults are the paper's.
 #[derive(Debug, Default, Args)]
@@ -143,7 +140,7 @@ struct Manner {
 ///
 /// # Errors
 /// [`BadInput`] before anything is written; other errors leave a run that can be resumed.
-pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
+pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
     let given = arguments.given().map_err(BadInput::new)?;
     let threads = settings::threads(&given).map_err(BadInput::new)?;
     if arguments.open {
@@ -168,10 +165,9 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
                     show_line!("{} is complete; its hash is {hash}", directory.display());
                 }
                 if arguments.open {
-                    let stop = stop_on_ctrl_c()?;
-                    watch(directory, &stop)?;
+                    watch(directory, stop_on_signal()?)?;
                 }
-                return Ok(ExitCode::SUCCESS);
+                return Ok(Exit::Done);
             }
         },
         None => {
@@ -187,21 +183,22 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<ExitCode> {
                 None => BadInput::new(error),
             })?;
             if given.place("seed").is_none() && arguments.progress != ProgressMode::Json {
-                show_line!("seed {seed} (drawn)");
+                show_event!("seed {seed} (drawn)");
             }
             (experiment, run)
         }
     };
-    let stop = stop_on_ctrl_c()?;
-    let finished =
-        thread_pool(threads)?.install(|| generations(experiment, &run, manner, &stop))?;
+    let stop = stop_on_signal()?;
+    let finished = thread_pool(threads)?.install(|| generations(experiment, &run, manner, stop))?;
     if !finished {
-        return Ok(ExitCode::from(EXIT_INTERRUPTED));
+        let program = summary::program();
+        let directory = summary::shell_word(run.path());
+        return stopped(&format!("{program} evolve --resume {directory}"));
     }
     if arguments.open {
-        watch(run.path(), &stop)?;
+        watch(run.path(), stop)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(Exit::Done)
 }
 
 /// Plays a run that has ended.
@@ -227,14 +224,10 @@ fn generations(
     let finished = until_finished(&mut experiment, run, how, stop, |record| {
         progress.generation(record);
     })?;
+    progress.end();
     if !finished {
-        progress.end();
-        let program = summary::program();
-        let directory = summary::shell_word(run.path());
-        eprintln!("interrupted; go on with: {program} evolve --resume {directory}");
         return Ok(false);
     }
-    progress.end();
     let finding = experiment
         .finding()?
         .ok_or_else(|| anyhow::anyhow!("an evolution has at least one generation"))?;
@@ -252,18 +245,4 @@ fn generations(
         show!("\n{}", summary::evolved(&experiment, &finding, run.path()));
     }
     Ok(true)
-}
-
-/// The first Ctrl-C asks for an end after this generation, the second ends at once; both leave a
-/// run that can be resumed.
-pub(super) fn stop_on_ctrl_c() -> Result<Arc<AtomicBool>, ctrlc::Error> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if asked.swap(true, Ordering::Relaxed) {
-            std::process::exit(EXIT_INTERRUPTED.into());
-        }
-        eprintln!("\nending; Ctrl-C again ends at once");
-    })?;
-    Ok(stop)
 }

@@ -107,7 +107,7 @@ pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
         _ => None,
     };
     if let Some(file) = file {
-        eprintln!("{}", probe_rs_line(&file, &arguments.chip, address));
+        tell!("{}", probe_rs_line(&file, &arguments.chip, address));
     }
     Ok(())
 }

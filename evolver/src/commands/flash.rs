@@ -25,7 +25,7 @@ pub fn flash(arguments: &FlashArgs) -> anyhow::Result<()> {
     let container = read_genome(&arguments.genome)?;
     let (port, baud) = arguments.port.checked()?;
     let mut robot = Robot::connect(&port, baud).map_err(BadInput::new)?;
-    eprintln!("{port}: {}", robot.identity());
+    tell!("{port}: {}", robot.identity());
     robot.check_kernel().map_err(BadInput::new)?;
     let was_running = robot.identity().running;
     robot.stop().map_err(BadInput::new)?;

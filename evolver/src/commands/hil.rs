@@ -2,6 +2,7 @@
 
 use super::conditions::GenomeConditions;
 use super::{BadInput, PortArgs, read_genome};
+use crate::exit::Exit;
 use crate::finished_run::FinishedRun;
 use crate::hil::{Course, HilError, Ran};
 use crate::report::summary::program;
@@ -11,7 +12,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 use minimal_surprise_controller::{Controller, EncodedGenome};
 use minimal_surprise_sim::SeedTree;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// What to run, and where the robot is.
 #[derive(Debug, Args)]
@@ -32,7 +32,7 @@ pub struct HilArgs {
 ///
 /// # Errors
 /// [`BadInput`] if the run cannot be read, there is no such robot, or it runs another genome.
-pub fn hil(arguments: &HilArgs) -> anyhow::Result<ExitCode> {
+pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
     let (course, genome) = if arguments.run.is_dir() {
         of_run(arguments)?
     } else {
@@ -41,11 +41,11 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<ExitCode> {
     let simulated = course.simulate().map_err(BadInput::new)?;
     let Some(port) = &arguments.port else {
         show_line!("hash        {}", simulated.hash);
-        return Ok(ExitCode::SUCCESS);
+        return Ok(Exit::Done);
     };
     let (port, baud) = port.checked()?;
     let mut robot = Robot::connect(&port, baud).map_err(BadInput::new)?;
-    eprintln!("{port}: {}", robot.identity());
+    tell!("{port}: {}", robot.identity());
     robot.check_kernel().map_err(BadInput::new)?;
     let container = read_genome(&genome)?;
     if !is_in_use(robot.identity().genome, &container) {
@@ -69,11 +69,11 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<ExitCode> {
     show_line!("hash        {}", ran.hash);
     if ran == simulated {
         show_line!("simulation  {}, equal", simulated.hash);
-        Ok(ExitCode::SUCCESS)
+        Ok(Exit::Done)
     } else {
         show_line!("simulation  {}, different", simulated.hash);
-        eprintln!("error: {}", difference(&ran, &simulated));
-        Ok(ExitCode::FAILURE)
+        tell!("error: {}", difference(&ran, &simulated));
+        Ok(Exit::Failure)
     }
 }
 

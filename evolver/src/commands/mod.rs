@@ -17,8 +17,11 @@ pub mod pictures;
 pub mod replay;
 pub mod suite;
 
+use crate::exit::Exit;
 use crate::files;
+use crate::output;
 use crate::robot::PortName;
+use crate::run_dir::RunDirError;
 use crate::settings::count;
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
@@ -34,6 +37,39 @@ impl BadInput {
     /// With whatever message says what is wrong.
     pub fn new(message: impl ToString) -> Self {
         Self(message.to_string())
+    }
+}
+
+/// Not all that was asked for is done; the message says how to go on.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Unfinished(String);
+
+/// How the program ends after an error.
+#[must_use]
+pub fn exit_of(error: &anyhow::Error) -> Exit {
+    let run_dir = error.downcast_ref::<RunDirError>();
+    if error.is::<BadInput>() || run_dir.is_some_and(RunDirError::is_bad_input) {
+        Exit::BadInput
+    } else if error.is::<Unfinished>() {
+        Exit::Unfinished
+    } else {
+        Exit::Failure
+    }
+}
+
+/// Work has stopped before it was done. Says why and how to go on.
+fn stopped(go_on: &str) -> anyhow::Result<Exit> {
+    match output::lost() {
+        None => {
+            tell!("interrupted; go on with: {go_on}");
+            Ok(Exit::Interrupted)
+        }
+        Some(error) if output::is_gone(error) => Err(Unfinished(format!(
+            "nobody reads standard output any more, and not all is done; go on with: {go_on}"
+        ))
+        .into()),
+        Some(error) => anyhow::bail!("standard output: {error}; go on with: {go_on}"),
     }
 }
 

@@ -2,14 +2,16 @@
 
 use super::evaluate::flag;
 use super::{BadInput, PortArgs};
+use crate::output;
 use crate::robot::{Robot, fault_names};
 use crate::settings::count;
+use crate::signals::on_signal;
 use clap::Args;
 use console::Term;
 use minimal_surprise_controller::Surprise;
 use minimal_surprise_link::{LineCounters, Report};
 use serde_json::json;
-use std::io::{self, ErrorKind, IsTerminal, Write};
+use std::io;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
@@ -37,15 +39,15 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<()> {
     };
     let (port, baud) = arguments.port.checked()?;
     let (stop, stopped) = channel();
-    ctrlc::set_handler(move || {
+    on_signal(move || {
         // A second Ctrl-C has nobody left to tell.
         let _ = stop.send(());
     })?;
     let mut robot = Robot::connect(&port, baud).map_err(BadInput::new)?;
-    eprintln!("{port}: {}", robot.identity());
+    tell!("{port}: {}", robot.identity());
     let show = if arguments.json {
         Show::Json
-    } else if io::stdout().is_terminal() {
+    } else if output::stdout_is_screen() {
         Show::OneLine
     } else {
         Show::Lines
@@ -60,7 +62,7 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<()> {
             _ => break,
         }
         let Some((report, line)) = robot.telemetry().map_err(BadInput::new)? else {
-            eprintln!("{port}: it was restarted; {}", robot.identity());
+            tell!("{port}: it was restarted; {}", robot.identity());
             before = None;
             continue;
         };
@@ -74,7 +76,7 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<()> {
             };
             match show.sample(&sample) {
                 // Whoever read this has seen enough.
-                Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
+                Err(error) if output::is_gone(&error) => return Ok(()),
                 shown => shown?,
             }
         }
@@ -126,8 +128,8 @@ impl Show {
                 let text: String = sample.text().chars().take(columns).collect();
                 terminal.write_str(&text)
             }
-            Self::Lines => writeln!(io::stdout(), "{}", sample.text()),
-            Self::Json => writeln!(io::stdout(), "{}", sample.json()),
+            Self::Lines => output::try_write(format_args!("{}\n", sample.text())),
+            Self::Json => output::try_write(format_args!("{}\n", sample.json())),
         }
     }
 }

@@ -11,14 +11,14 @@ use crate::replay::page::page;
 use crate::replay::recording::{Origin, Recording};
 use crate::replay::scene::Colouring;
 use crate::replay::terminal::{self, PlayError};
+use crate::signals::{ask_to_stop, on_signal, stop};
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::damage::Damage;
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::{Area, SeedTree};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// The keys of the terminal.
 const KEYS: &str = "\
@@ -94,8 +94,9 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
     if arguments.pictures.is_any() {
         arguments.pictures.write(&recording, arguments.colour)?;
     } else if arguments.html.is_none() {
-        let stop = stop_on_signal()?;
-        in_terminal(&recording, arguments.colour, &stop)?;
+        // In the terminal Ctrl-C is a key; this is for those who are not at its keyboard.
+        on_signal(ask_to_stop)?;
+        in_terminal(&recording, arguments.colour, stop())?;
     }
     Ok(())
 }
@@ -116,14 +117,6 @@ pub(super) fn in_terminal(
         .into(),
         error => error.into(),
     })
-}
-
-/// In the terminal Ctrl-C is a key; this is for those who are not at its keyboard.
-fn stop_on_signal() -> Result<Arc<AtomicBool>, ctrlc::Error> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
-    Ok(stop)
 }
 
 /// Refuses to write where there is something.

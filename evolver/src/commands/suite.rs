@@ -1,8 +1,8 @@
 //! `evolver paper` and `evolver suite FILE`: many evolutions, on one machine or many.
 
 use super::evaluate::flag;
-use super::evolve::stop_on_ctrl_c;
-use super::{BadInput, thread_pool};
+use super::{BadInput, stopped, thread_pool};
+use crate::exit::Exit;
 use crate::files;
 use crate::finished_run::ReadRunError;
 use crate::replay::gallery::{self, Existing};
@@ -11,6 +11,7 @@ use crate::report::suite_progress::{SearchProgress, SuiteProgress};
 use crate::report::summary::shell_word;
 use crate::run_dir::{Found, RunDir, RunDirError};
 use crate::settings::count;
+use crate::signals::stop_on_signal;
 use crate::suite::plan::{Plan, PlannedRun};
 use crate::suite::report::{self, ReportError};
 use crate::suite::search::{Search, look};
@@ -20,12 +21,8 @@ use clap::{Args, Subcommand, ValueEnum};
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-
-/// Exit code after Ctrl-C.
-const EXIT_INTERRUPTED: u8 = 130;
 
 /// How long a task waits until it looks again at runs that others hold.
 const LOOK_AGAIN: Duration = Duration::from_secs(1);
@@ -170,7 +167,7 @@ struct Read {
 ///
 /// # Errors
 /// [`BadInput`] before anything is written; other errors leave runs that can be gone on with.
-pub fn paper(verb: &Verb) -> anyhow::Result<ExitCode> {
+pub fn paper(verb: &Verb) -> anyhow::Result<Exit> {
     let suite = Suite::paper().map_err(BadInput::new)?;
     let text = PAPER.to_owned();
     let called = "evolver paper".to_owned();
@@ -188,7 +185,7 @@ pub fn paper(verb: &Verb) -> anyhow::Result<ExitCode> {
 ///
 /// # Errors
 /// As [`paper`].
-pub fn suite(arguments: &SuiteArgs) -> anyhow::Result<ExitCode> {
+pub fn suite(arguments: &SuiteArgs) -> anyhow::Result<Exit> {
     act(&read(&arguments.file)?, &arguments.verb)
 }
 
@@ -196,7 +193,7 @@ pub fn suite(arguments: &SuiteArgs) -> anyhow::Result<ExitCode> {
 ///
 /// # Errors
 /// As [`paper`].
-pub fn run_task(arguments: &TaskArgs) -> anyhow::Result<ExitCode> {
+pub fn run_task(arguments: &TaskArgs) -> anyhow::Result<Exit> {
     let shard = flag("shard", &arguments.shard, Shard::parse)?;
     let read = read(&arguments.suite)?;
     let plan = plan(&read.suite, &arguments.choice)?;
@@ -223,7 +220,7 @@ fn read(file: &Path) -> Result<Read, BadInput> {
     })
 }
 
-fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
+fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
     let (Verb::Plan(choice)
     | Verb::Run { choice, .. }
     | Verb::Status(choice)
@@ -312,7 +309,7 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<ExitCode> {
             }
         }
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(Exit::Done)
 }
 
 /// The gallery of a plan's finished runs; an earlier one is replaced.
@@ -537,7 +534,7 @@ struct Work<'a> {
     share: Share,
 }
 
-fn run(work: &Work) -> anyhow::Result<ExitCode> {
+fn run(work: &Work) -> anyhow::Result<Exit> {
     let Work {
         plan,
         directory,
@@ -553,10 +550,10 @@ fn run(work: &Work) -> anyhow::Result<ExitCode> {
         None => None,
     };
     let runs = shard.of_plan(plan);
-    let stop = stop_on_ctrl_c()?;
+    let stop = stop_on_signal()?;
     let pool = thread_pool(threads)?;
     let worked = loop {
-        let worked = pool.install(|| do_all(plan, &runs, directory, manner.progress, &stop))?;
+        let worked = pool.install(|| do_all(plan, &runs, directory, manner.progress, stop))?;
         match worked {
             Some(1..) if stop.load(Ordering::Relaxed) => break None,
             Some(1..) if work.share != Share::Whole => std::thread::sleep(LOOK_AGAIN),
@@ -566,12 +563,11 @@ fn run(work: &Work) -> anyhow::Result<ExitCode> {
     let mut searched = worked.is_some();
     for asked in to_search {
         searched =
-            searched && pool.install(|| search(plan, asked, directory, manner.progress, &stop))?;
+            searched && pool.install(|| search(plan, asked, directory, manner.progress, stop))?;
     }
     let worked = worked.filter(|_| searched);
     let Some(elsewhere) = worked else {
-        eprintln!("interrupted; the same command goes on");
-        return Ok(ExitCode::from(EXIT_INTERRUPTED));
+        return stopped("the same command");
     };
     let done = finished(&runs, directory).map_err(BadInput::new)?.len();
     let mut hash = None;
@@ -617,7 +613,7 @@ fn run(work: &Work) -> anyhow::Result<ExitCode> {
             show_line!("for a structure that no run formed, once all are done: {command}");
         }
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(Exit::Done)
 }
 
 /// The command that searches for a structure, if one may have to be searched for.

@@ -1,19 +1,23 @@
 //! Progress of a run: a bar, lines, JSON, or nothing.
 
 use crate::experiment::GenerationRecord;
+use crate::output;
 use crate::settings::Settings;
 use clap::ValueEnum;
+use console::Term;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
 use std::time::{Duration, Instant};
+
+/// Fewest columns of a terminal for a bar beside the numbers.
+const COLUMNS_FOR_BAR: u16 = 40;
 
 /// How progress is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum ProgressMode {
-    /// A bar on a terminal, lines elsewhere.
+    /// A bar on a terminal that can draw one, lines elsewhere.
     #[default]
     Auto,
-    /// A bar, on standard error.
+    /// The same: a bar, on standard error, where it can be drawn.
     Bar,
     /// A line a generation, on standard error.
     Lines,
@@ -35,28 +39,51 @@ pub struct Progress {
     population: f64,
 }
 
+/// What progress is shown with.
 #[derive(Debug)]
-enum Shown {
+pub(super) enum Shown {
     Bar(ProgressBar),
     Lines,
     Json,
     Nothing,
 }
 
+impl Shown {
+    /// Of a bar, `numbers` is what stands beside it.
+    pub(super) fn new(
+        mode: ProgressMode,
+        numbers: &str,
+        bar: impl FnOnce() -> ProgressBar,
+    ) -> Self {
+        match mode {
+            ProgressMode::Auto | ProgressMode::Bar if output::stderr_is_screen() => {
+                let narrow = Term::stderr().size().1 < COLUMNS_FOR_BAR;
+                let gauge = if narrow { "" } else { "{bar:16} " };
+                let style =
+                    ProgressStyle::with_template(&format!("{gauge}{numbers}  {{wide_msg}}"))
+                        .expect("the template is well-formed");
+                let style = match output::stderr_is_ascii() {
+                    true => style.progress_chars("#-"),
+                    false => style,
+                };
+                let bar = bar().with_style(style);
+                bar.enable_steady_tick(Duration::from_millis(200));
+                Self::Bar(bar)
+            }
+            ProgressMode::Auto | ProgressMode::Bar | ProgressMode::Lines => Self::Lines,
+            ProgressMode::Json => Self::Json,
+            ProgressMode::None => Self::Nothing,
+        }
+    }
+}
+
 impl Progress {
     /// Starts the clock. `done` generations lie before this process.
     #[must_use]
     pub fn start(mode: ProgressMode, settings: &Settings, done: u32) -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        let shown = match mode {
-            ProgressMode::Bar => Shown::Bar(bar(settings.generations, done)),
-            ProgressMode::Auto if terminal => Shown::Bar(bar(settings.generations, done)),
-            ProgressMode::Auto | ProgressMode::Lines => Shown::Lines,
-            ProgressMode::Json => Shown::Json,
-            ProgressMode::None => Shown::Nothing,
-        };
+        let bar = || ProgressBar::new(settings.generations.into()).with_position(done.into());
         Self {
-            shown,
+            shown: Shown::new(mode, "{pos}/{len}", bar),
             started: Instant::now(),
             generations_before: done,
             generations: settings.generations,
@@ -85,13 +112,13 @@ impl Progress {
                     seconds(left)
                 ));
             }
-            Shown::Lines => eprintln!(
+            Shown::Lines => tell!(
                 "generation {done}/{}  best {best:.4}  mean {mean:.4}  \
                  {millions:.1} M robot-steps/s  {} left",
                 self.generations,
                 seconds(left)
             ),
-            Shown::Json => show_line!(
+            Shown::Json => show_event!(
                 "{}",
                 serde_json::json!({
                     "event": "generation",
@@ -113,15 +140,6 @@ impl Progress {
             bar.finish_and_clear();
         }
     }
-}
-
-fn bar(generations: u32, done: u32) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:16} {pos}/{len}  {wide_msg}")
-        .expect("the template is well-formed");
-    let bar = ProgressBar::new(generations.into()).with_style(style);
-    bar.set_position(done.into());
-    bar.enable_steady_tick(Duration::from_millis(200));
-    bar
 }
 
 /// A duration as people say it.

@@ -1,11 +1,11 @@
 //! Progress of a suite: suite, experiment and run level, with the time left by what was measured.
 
-use super::progress::{ProgressMode, seconds};
+use super::progress::{ProgressMode, Shown, seconds};
+use crate::output::for_stderr;
 use crate::suite::plan::{Plan, PlannedRun, label};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use std::cell::Cell;
 use std::collections::BTreeMap;
-use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
 /// Shows the progress of the runs of one process.
@@ -21,26 +21,6 @@ pub struct SuiteProgress {
     completed: Cell<usize>,
     worked: Cell<u64>,
     to_work: u64,
-}
-
-#[derive(Debug)]
-enum Shown {
-    Bar(ProgressBar),
-    Lines,
-    Json,
-    Nothing,
-}
-
-impl Shown {
-    fn new(mode: ProgressMode, bar: impl FnOnce() -> Self) -> Self {
-        match mode {
-            ProgressMode::Bar => bar(),
-            ProgressMode::Auto if std::io::stderr().is_terminal() => bar(),
-            ProgressMode::Auto | ProgressMode::Lines => Self::Lines,
-            ProgressMode::Json => Self::Json,
-            ProgressMode::None => Self::Nothing,
-        }
-    }
 }
 
 impl SuiteProgress {
@@ -60,17 +40,11 @@ impl SuiteProgress {
                 labels.entry(run.id.clone()).or_insert(label);
             }
         }
-        let bar = || {
-            let style = ProgressStyle::with_template("{bar:16} {pos}/{len} runs  {wide_msg}")
-                .expect("the template is well-formed");
-            let bar = ProgressBar::new(runs.len() as u64).with_style(style);
-            bar.set_position((runs.len() - waiting) as u64);
-            bar.enable_steady_tick(Duration::from_millis(200));
-            Shown::Bar(bar)
-        };
+        let done = (runs.len() - waiting) as u64;
+        let bar = || ProgressBar::new(runs.len() as u64).with_position(done);
         let steps_of_a_run = runs.first().map_or(0, |run| robot_steps(run));
         Self {
-            shown: Shown::new(mode, bar),
+            shown: Shown::new(mode, "{pos}/{len} runs", bar),
             started: Instant::now(),
             labels,
             runs: runs.len(),
@@ -84,7 +58,7 @@ impl SuiteProgress {
     /// A run begins, or is gone on with.
     pub fn begins(&self, run: &PlannedRun) {
         if let Shown::Bar(bar) = &self.shown {
-            bar.set_message(self.label(run).to_owned());
+            bar.set_message(for_stderr(self.label(run)).into_owned());
         }
     }
 
@@ -95,11 +69,11 @@ impl SuiteProgress {
         match &self.shown {
             Shown::Bar(bar) => bar.set_message(format!(
                 "{}  generation {generation}/{}  {} left",
-                self.label(run),
+                for_stderr(self.label(run)),
                 run.settings.generations,
                 seconds(self.left())
             )),
-            Shown::Json => show_line!(
+            Shown::Json => show_event!(
                 "{}",
                 serde_json::json!({
                     "event": "generation",
@@ -119,13 +93,13 @@ impl SuiteProgress {
         let done = self.done_before + self.completed.get();
         match &self.shown {
             Shown::Bar(bar) => bar.set_position(done as u64),
-            Shown::Lines => eprintln!(
+            Shown::Lines => tell!(
                 "{done}/{} runs  {}  {} left",
                 self.runs,
                 self.label(run),
                 seconds(self.left())
             ),
-            Shown::Json => show_line!(
+            Shown::Json => show_event!(
                 "{}",
                 serde_json::json!({
                     "event": "run",
@@ -168,17 +142,10 @@ impl SearchProgress {
     /// For the experiment that searches.
     #[must_use]
     pub fn start(mode: ProgressMode, experiment: &str) -> Self {
-        let bar = || {
-            let style =
-                ProgressStyle::with_template("{prefix}: {pos} runs beyond the plan  {wide_msg}")
-                    .expect("the template is well-formed");
-            let bar = ProgressBar::no_length().with_style(style);
-            bar.set_prefix(experiment.to_owned());
-            bar.enable_steady_tick(Duration::from_millis(200));
-            Shown::Bar(bar)
-        };
+        let prefix = for_stderr(experiment).into_owned();
+        let bar = || ProgressBar::no_length().with_prefix(prefix);
         Self {
-            shown: Shown::new(mode, bar),
+            shown: Shown::new(mode, "{prefix}: {pos} runs beyond the plan", bar),
         }
     }
 
@@ -188,13 +155,13 @@ impl SearchProgress {
         match &self.shown {
             Shown::Bar(bar) => {
                 bar.set_position(number.into());
-                bar.set_message(format!("{label}, seed {}", run.seed));
+                bar.set_message(format!("{}, seed {}", for_stderr(&label), run.seed));
             }
-            Shown::Lines => eprintln!(
+            Shown::Lines => tell!(
                 "{experiment}: run {number} beyond the plan, {label}, seed {}",
                 run.seed
             ),
-            Shown::Json => show_line!(
+            Shown::Json => show_event!(
                 "{}",
                 serde_json::json!({
                     "event": "further-run",

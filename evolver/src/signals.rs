@@ -1,0 +1,85 @@
+//! Signals that ask for an end. Those that the caller ignores stay ignored: a run under `nohup`
+//! outlives its terminal, and Ctrl-C is not for a script's background jobs.
+
+use crate::exit::Exit;
+use signal_hook::{consts, flag};
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+/// Signals that ask for an end.
+#[cfg(unix)]
+const SIGNALS: [i32; 3] = [consts::SIGINT, consts::SIGTERM, consts::SIGHUP];
+#[cfg(not(unix))]
+const SIGNALS: [i32; 2] = [consts::SIGINT, consts::SIGTERM];
+
+/// How often it is looked whether one has come. Those that come together, as from a terminal and
+/// from its shell, count as one.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Whether work is to stop where it can be resumed.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// Whether work is to stop where it can be resumed.
+#[must_use]
+pub fn stop() -> &'static AtomicBool {
+    &STOP
+}
+
+/// Asks work to stop where it can be resumed.
+pub fn ask_to_stop() {
+    STOP.store(true, Ordering::Relaxed);
+}
+
+/// The first signal asks work to stop after this generation, the second ends it at once; both leave
+/// what can be resumed.
+///
+/// # Errors
+/// If the operating system does not hand signals over.
+pub fn stop_on_signal() -> io::Result<&'static AtomicBool> {
+    let mut asked = false;
+    on_signal(move || {
+        if asked {
+            Exit::Interrupted.now();
+        }
+        asked = true;
+        ask_to_stop();
+        tell!("\nending after this generation; Ctrl-C again ends at once");
+    })?;
+    Ok(stop())
+}
+
+/// Calls `handle`, on a thread of its own, whenever a signal asks for an end.
+///
+/// # Errors
+/// If the operating system does not hand signals over.
+pub fn on_signal(mut handle: impl FnMut() + Send + 'static) -> io::Result<()> {
+    let came = Arc::new(AtomicBool::new(false));
+    let ignored = ignored();
+    for signal in SIGNALS
+        .into_iter()
+        .filter(|signal| ignored >> (signal - 1) & 1 == 0)
+    {
+        flag::register(signal, Arc::clone(&came))?;
+    }
+    thread::Builder::new().spawn(move || {
+        loop {
+            thread::sleep(LOOK);
+            if came.swap(false, Ordering::Relaxed) {
+                handle();
+            }
+        }
+    })?;
+    Ok(())
+}
+
+/// The signals that this process ignores, bit n − 1 for signal n; none where the system has no file
+/// that says so.
+fn ignored() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
+        .unwrap_or(0)
+}
