@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tests::browser::{Browser, chromium};
 use tests::full;
+use tests::noisy_run::copy_noisy_run;
 use tests::program::{Evolver, Finished};
 use tests::tools::require;
 
@@ -109,7 +110,8 @@ fn the_page_shows_the_scenes_of_the_program_and_hashes_the_steps_of_the_run() {
         ),
     ];
     let evolver = with_runs(&flags);
-    for (name, _) in flags {
+    copy_noisy_run(&evolver.folder().join("runs/noisy-v1"));
+    for name in flags.map(|(name, _)| name).into_iter().chain(["noisy-v1"]) {
         succeed(&evolver, &format!("replay runs/{name} --html {name}.html"));
         open(&mut browser, &evolver.folder().join(format!("{name}.html")));
         let recording = recording_of(&evolver, &format!("runs/{name}"));
@@ -118,7 +120,7 @@ fn the_page_shows_the_scenes_of_the_program_and_hashes_the_steps_of_the_run() {
         assert_eq!(status, "good", "{words}");
         assert!(words.contains("what the run recorded"), "{words}");
         let hash: String = browser.evaluate("replay.state().check.computed");
-        assert_eq!(Some(hash), recording.origin.steps_hash);
+        assert_eq!(hash, recording.origin.steps_hash.as_ref().unwrap().hash);
         let fitness: f64 = browser.evaluate(&format!("replay.fitness({})", recording.steps()));
         let ours = *recording.minds.unwrap().fitness.last().unwrap();
         assert!((fitness - ours).abs() < 1e-12, "{fitness} {ours}");
@@ -180,7 +182,7 @@ fn a_page_whose_steps_are_not_those_of_the_run_says_so() {
     let Some(mut browser) = browser() else { return };
     let evolver = with_runs(&[("run", "--seed 4 --steps 40")]);
     let state: Value = serde_json::from_slice(&evolver.read("runs/run/final.json")).unwrap();
-    let recorded = state["steps_hash"].as_str().unwrap();
+    let recorded = state["steps_hash_v2"].as_str().unwrap();
     let other = recorded.chars().rev().collect::<String>();
     let changed = evolver
         .text("runs/run/final.json")

@@ -6,6 +6,7 @@ use minimal_surprise_sim::Pose;
 use minimal_surprise_sim::exchange::Trajectory;
 use std::fs;
 use std::path::{Path, PathBuf};
+use tests::noisy_run::copy_noisy_run;
 use tests::program::{Evolver, Finished};
 
 /// A folder with a short run in `run`.
@@ -540,7 +541,8 @@ fn a_run_with_the_genome_or_the_state_of_another_is_refused_by_all_who_replay_it
                  --seed 5 --out other";
     assert_eq!(evolver.run(&words(other)).code, Some(0));
     let state = evolver.text("run/final.json");
-    let hash_at = state.find("steps_hash").expect("it is recorded") + "steps_hash\": \"".len();
+    let hash_at =
+        state.find("steps_hash_v2").expect("it is recorded") + "steps_hash_v2\": \"".len();
     let mut other_hash = state.clone();
     let digit = if &state[hash_at..=hash_at] == "0" {
         "1"
@@ -575,6 +577,27 @@ fn a_run_with_the_genome_or_the_state_of_another_is_refused_by_all_who_replay_it
         evolver.write(&file, &good);
     }
     replay(&evolver, "run --svg out");
+}
+
+#[test]
+fn a_noisy_run_of_the_first_version_is_checked_by_the_bits_that_it_hashed() {
+    let evolver = Evolver::in_empty_folder();
+    copy_noisy_run(&evolver.folder().join("run"));
+    let lines = [
+        "classify run",
+        "replay run --html a.html",
+        "gallery run --out gallery",
+    ];
+    for line in lines {
+        let run = evolver.run(&words(line));
+        assert_eq!(run.code, Some(0), "{line}: {run:?}");
+    }
+    // The same hash as one of version 2 is another run's.
+    let state = evolver.text("run/final.json");
+    let state = state.replace("\"steps_hash\"", "\"steps_hash_v2\"");
+    evolver.write("run/final.json", state.as_bytes());
+    let run = evolver.run(&words("classify run"));
+    assert_refused(&run, &["error: run: best.genome", "final.json", "another"]);
 }
 
 #[test]

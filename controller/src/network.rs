@@ -426,12 +426,22 @@ mod tests {
     #[test]
     fn the_largest_sums_are_exact() {
         let shape = Shape::new(15, 14, 14, true).unwrap();
-        for weight in [32767, -32767] {
-            let network: PredictionNetwork = network(shape, &mut core::iter::repeat(weight));
-            let mut hidden = Aligned([4096; MAX_HIDDEN]);
-            network.forward(0x7fff, &mut hidden);
-            let mut hidden = Aligned([-4096; MAX_HIDDEN]);
-            network.forward(0, &mut hidden);
+        for (level, weight) in [(1, 1), (1, -1), (-1, 1), (-1, -1)] {
+            let (level, weight) = (level * 32767, weight * 32767);
+            // Thresholds that make every input neuron as large as the self-loop's value.
+            let inputs = [0, -level].into_iter().cycle().take(30);
+            let mut weights = inputs.chain(core::iter::repeat(weight));
+            let network: PredictionNetwork = network(shape, &mut weights);
+            let value = activate(level);
+            assert!(value.abs() >= ONE_Q3_12 - 1);
+            let mut hidden = Aligned([value; MAX_HIDDEN]);
+            let outputs = network.forward(0, &mut hidden);
+            let sum = 16 * i64::from(value) * i64::from(weight) + 2048;
+            let sum = (sum >> 12).clamp(i16::MIN.into(), i16::MAX.into());
+            let expected = activate(sum as i16);
+            assert_eq!(hidden.0, [expected; MAX_HIDDEN], "{level} {weight}");
+            let positive = 14 * i64::from(expected) * i64::from(weight) >= 0;
+            assert_eq!(outputs, if positive { 0x3fff } else { 0 });
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::evolution::{Population, best_slot};
 use crate::generation_work::Work;
 use crate::run_hash::RunHash;
 use crate::settings::Settings;
-use crate::steps_hash::StepsHash;
+use crate::steps_hash::{StepsHash, Version};
 use minimal_surprise_controller::{Controller, Genome, Provenance};
 use minimal_surprise_sim::evaluation::{Outcome, run};
 use minimal_surprise_sim::metrics::Measures;
@@ -199,7 +199,8 @@ impl Experiment {
         let trial = scenario.trial(seeds, record.generation, record.worst_repetition);
         let mut measures =
             Measures::starting_from(scenario.grid(), self.settings.topology, &trial.starts);
-        let mut steps_hash = StepsHash::starting_from(&trial.starts);
+        let mut steps_hash =
+            StepsHash::new(Version::default(), &trial, self.settings.topology.model());
         let outcome = run(&Controller::new(genome), scenario, &trial, |world| {
             measures.observe(world);
             steps_hash.observe(world);

@@ -2,7 +2,7 @@
 
 use crate::files::{self, DATA_BYTES_MAX, FileError, TEXT_BYTES_MAX};
 use crate::settings::{Given, SettingError, Settings};
-use crate::steps_hash::StepsHash;
+use crate::steps_hash::{RecordedHash, StepsHash, Version};
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_controller::{Controller, DecodeError, EncodedGenome, Genome, Provenance};
 use minimal_surprise_sim::evaluation::run;
@@ -30,7 +30,7 @@ pub struct FinishedRun {
     /// The run's hash.
     pub hash: String,
     /// The hash of its steps; a run of an older program has none.
-    pub steps_hash: Option<String>,
+    pub steps_hash: Option<RecordedHash>,
     /// Best fitness of every generation.
     pub best_fitness: Vec<f64>,
 }
@@ -154,7 +154,7 @@ pub struct FinalState {
     /// The repetition that it was run from.
     pub repetition: u32,
     /// The hash of the steps in between, if the file has it.
-    pub steps_hash: Option<String>,
+    pub steps_hash: Option<RecordedHash>,
 }
 
 /// What is read of a line of `generations.csv`.
@@ -173,6 +173,7 @@ struct FinalFile {
     grid: String,
     repetition: u32,
     steps_hash: Option<String>,
+    steps_hash_v2: Option<String>,
     start: Vec<Pose>,
     r#final: Vec<Pose>,
 }
@@ -221,12 +222,14 @@ pub fn parse_final_state(path: &Path, bytes: &[u8]) -> Result<FinalState, StateE
             error,
         })?;
     }
+    let recorded = |hash: Option<String>, version| hash.map(|hash| RecordedHash { version, hash });
     Ok(FinalState {
         grid,
         starts: file.start,
         final_poses: file.r#final,
         repetition: file.repetition,
-        steps_hash: file.steps_hash,
+        steps_hash: recorded(file.steps_hash_v2, Version::V2)
+            .or_else(|| recorded(file.steps_hash, Version::V1)),
     })
 }
 
@@ -294,7 +297,12 @@ impl FinishedRun {
     /// the run wrote down.
     pub fn read_and_check(path: &Path) -> Result<Self, ReadRunError> {
         let finished = Self::read(path)?;
-        let mut hash = StepsHash::starting_from(&finished.starts);
+        let recorded = finished.steps_hash.as_ref();
+        let mut hash = StepsHash::new(
+            recorded.map_or_else(Version::default, |recorded| recorded.version),
+            &finished.trial(),
+            finished.settings.topology.model(),
+        );
         let mut ends = finished.starts.clone();
         finished
             .replay(|world| {
@@ -305,8 +313,7 @@ impl FinishedRun {
                 path: path.join("final.json"),
                 error,
             })?;
-        let recorded = finished.steps_hash.as_ref();
-        let other_steps = recorded.is_some_and(|recorded| *recorded != hash.to_string());
+        let other_steps = recorded.is_some_and(|recorded| recorded.hash != hash.to_string());
         if other_steps || ends != finished.final_poses {
             return Err(ReadRunError::Inconsistent {
                 path: path.to_owned(),

@@ -5,47 +5,85 @@
 //! step is `h ← SHA-256(h ‖ step)`: for every robot its reading in 16 bits, action and turn in 8
 //! bits each, its new prediction in 16 bits, and its pose afterwards. A pose is x and y in 16 bits
 //! each and the heading in 8. All little-endian.
+//!
+//! Under version 1 a reading also has the bits beyond the model's sensors that noise draws. Without
+//! noise both versions give the same hash.
 
-use minimal_surprise_sim::{Pose, World};
+use minimal_surprise_controller::SensorModel;
+use minimal_surprise_sim::noise::NoiseStream;
+use minimal_surprise_sim::{Pose, Trial, World};
 use sha2::{Digest, Sha256};
 use std::fmt;
 
 /// What the chain starts with.
 pub const START: &[u8] = b"minimal surprise steps, version 1";
 
+/// Which bits of a reading are hashed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Version {
+    /// All sixteen: what runs recorded under `steps_hash`.
+    V1,
+    /// Those of sensors: what runs record under `steps_hash_v2`.
+    #[default]
+    V2,
+}
+
+/// A hash of steps that a run recorded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordedHash {
+    /// How it was made.
+    pub version: Version,
+    /// The hash.
+    pub hash: String,
+}
+
 /// The chain after some steps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StepsHash([u8; 32]);
+#[derive(Clone, Debug)]
+pub struct StepsHash {
+    chain: [u8; 32],
+    /// Under version 1: the noise, and the bits of a reading that no sensor takes.
+    beyond_sensors: Option<(NoiseStream, u16)>,
+}
 
 impl StepsHash {
-    /// A swarm at its start.
+    /// A swarm at the start of a trial.
     #[must_use]
-    pub fn starting_from(starts: &[Pose]) -> Self {
+    pub fn new(version: Version, trial: &Trial, model: SensorModel) -> Self {
+        let starts = &trial.starts;
         let mut hash = Sha256::new_with_prefix(START);
         hash.update((starts.len() as u64).to_le_bytes());
         for &pose in starts {
             add_pose(&mut hash, pose);
         }
-        Self(hash.finalize().into())
+        let all_bits = version == Version::V1 && !trial.noise.rate().is_none();
+        Self {
+            chain: hash.finalize().into(),
+            beyond_sensors: all_bits.then(|| (trial.noise.clone(), !model.mask().bits())),
+        }
     }
 
     /// Adds the step that the world has just done.
     pub fn observe(&mut self, world: &World) {
-        let mut hash = Sha256::new_with_prefix(self.0);
+        let mut hash = Sha256::new_with_prefix(self.chain);
         let robots = world.readings().iter().zip(world.decisions());
-        for ((reading, decision), &pose) in robots.zip(world.poses()) {
-            hash.update(reading.bits().to_le_bytes());
+        for (robot, ((reading, decision), &pose)) in (0..).zip(robots.zip(world.poses())) {
+            let beyond = self.beyond_sensors.as_mut().map_or(0, |(noise, bits)| {
+                noise.draws(world.steps() - 1, robot) & *bits
+            });
+            hash.update((reading.bits() | beyond).to_le_bytes());
             hash.update([decision.action as u8, decision.turn as u8]);
             hash.update(decision.prediction.bits().to_le_bytes());
             add_pose(&mut hash, pose);
         }
-        self.0 = hash.finalize().into();
+        self.chain = hash.finalize().into();
     }
 }
 
 impl fmt::Display for StepsHash {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+        self.chain
+            .iter()
+            .try_for_each(|byte| write!(f, "{byte:02x}"))
     }
 }
 

@@ -165,15 +165,13 @@ impl Measures {
             .add_step(moved.count() as u32, straight.count() as u32);
         self.poses.copy_from_slice(poses);
 
-        // Noise also flips bits that the model has no sensor for.
-        let sensed = self.model.mask().bits();
         let mut mispredicted = 0;
         for (now, (prediction, &reading)) in self
             .mispredicted_now
             .iter_mut()
             .zip(self.predictions.iter().zip(readings))
         {
-            let differing = prediction.differing(SensorBits::new(reading.bits() & sensed));
+            let differing = prediction.differing(reading);
             *now = differing as u8;
             mispredicted += u64::from(differing);
             for (sensor, count) in self.predicted_occupied.iter_mut().enumerate() {

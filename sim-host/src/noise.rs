@@ -5,8 +5,8 @@
 //! generation, repetition, step and robot. The ChaCha8 key names the first three (see
 //! [`seed`](crate::seed)), the ChaCha stream number is the step, and robot n's words start at word
 //! 8·n: sixteen draws of 16 bits, of which sensor k takes number k (low half of a word first) and
-//! flips where it is below the rate. So no engine, order or thread changes it, and all genomes of
-//! a generation meet the same noise.
+//! flips where it is below the rate; draws that the model has no sensor for flip nothing. So no
+//! engine, order or thread changes it, and all genomes of a generation meet the same noise.
 
 use crate::seed::Stream;
 use minimal_surprise_controller::SensorBits;
@@ -72,28 +72,29 @@ impl NoiseStream {
         self.stream.get_seed()
     }
 
-    /// Flips the readings of all robots in one step, robot 0 first.
-    pub fn flip(&mut self, step: u32, readings: &mut [SensorBits]) {
+    /// Flips the readings of all robots in one step, robot 0 first, in the bits of `sensors` only.
+    pub fn flip(&mut self, step: u32, sensors: SensorBits, readings: &mut [SensorBits]) {
         if self.rate.is_none() {
             return;
         }
         self.stream.set_stream(step.into());
         self.stream.set_word_pos(0);
         for reading in readings {
-            *reading = SensorBits::new(reading.bits() ^ self.next_flips());
+            *reading = SensorBits::new(reading.bits() ^ self.next_draws() & sensors.bits());
         }
     }
 
-    /// Flips of one robot in one step, as bits.
+    /// The sixteen draws of one robot in one step: a bit is set where the draw is below the rate,
+    /// whether or not a sensor takes it.
     #[must_use]
-    pub fn flips(&mut self, step: u32, robot: u32) -> u16 {
+    pub fn draws(&mut self, step: u32, robot: u32) -> u16 {
         self.stream.set_stream(step.into());
         self.stream
             .set_word_pos(u128::from(robot) * WORDS_PER_ROBOT);
-        self.next_flips()
+        self.next_draws()
     }
 
-    fn next_flips(&mut self) -> u16 {
+    fn next_draws(&mut self) -> u16 {
         let mut flips = 0;
         for pair in 0..WORDS_PER_ROBOT {
             let word = self.stream.next_u32();
@@ -109,24 +110,37 @@ impl NoiseStream {
 mod tests {
     use super::*;
     use crate::seed::{Purpose, SeedTree};
+    use minimal_surprise_controller::SensorModel;
 
     fn noise(probability: f64) -> NoiseStream {
         let stream = SeedTree::new(11).stream(Purpose::Noise, 2, 3);
         NoiseStream::new(stream, NoiseRate::new(probability).unwrap())
     }
 
+    const ALL: SensorBits = SensorBits::new(0xffff);
+
     #[test]
     fn value_stability_flips() {
-        assert_eq!(noise(0.5).flips(4, 5), 613);
+        assert_eq!(noise(0.5).draws(4, 5), 613);
     }
 
     #[test]
     fn flips_do_not_depend_on_the_order_of_asking() {
         let mut readings = [SensorBits::NONE; 37];
-        noise(0.3).flip(9, &mut readings);
+        noise(0.3).flip(9, ALL, &mut readings);
         let mut other = noise(0.3);
         for robot in (0..37_u32).rev() {
-            assert_eq!(other.flips(9, robot), readings[robot as usize].bits());
+            assert_eq!(other.draws(9, robot), readings[robot as usize].bits());
+        }
+    }
+
+    #[test]
+    fn noise_flips_no_bit_that_the_model_has_no_sensor_for() {
+        for model in SensorModel::ALL {
+            let mut readings = [SensorBits::NONE; 50];
+            noise(0.5).flip(3, model.mask(), &mut readings);
+            let flipped = readings.iter().fold(0, |all, reading| all | reading.bits());
+            assert_eq!(flipped, model.mask().bits());
         }
     }
 
@@ -135,7 +149,7 @@ mod tests {
         for probability in [0.05, 0.1, 0.15, 0.5] {
             let mut noise = noise(probability);
             let mut readings = vec![SensorBits::NONE; 10_000];
-            noise.flip(0, &mut readings);
+            noise.flip(0, ALL, &mut readings);
             let flipped: u32 = readings.iter().map(|r| r.bits().count_ones()).sum();
             let share = f64::from(flipped) / 160_000.0;
             assert!((share - probability).abs() < 0.005, "{share}");
@@ -144,10 +158,10 @@ mod tests {
 
     #[test]
     fn rates_of_zero_and_one_flip_nothing_and_everything() {
-        assert_eq!(noise(0.0).flips(0, 0), 0);
-        assert_eq!(noise(1.0).flips(0, 0), 0xffff);
+        assert_eq!(noise(0.0).draws(0, 0), 0);
+        assert_eq!(noise(1.0).draws(0, 0), 0xffff);
         let mut readings = [SensorBits::new(5)];
-        noise(0.0).flip(0, &mut readings);
+        noise(0.0).flip(0, ALL, &mut readings);
         assert_eq!(readings[0].bits(), 5);
     }
 

@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(starts(4), starts(4));
         assert_ne!(starts(4), starts(5));
         assert_ne!(starts(4), scenario.trial(seeds, 0, 4).starts);
-        let flips = |mut trial: Trial| trial.noise.flips(0, 0);
+        let flips = |mut trial: Trial| trial.noise.draws(0, 0);
         let noise_of = |start| flips(scenario.reevaluation(seeds, start));
         assert_ne!(noise_of(0), noise_of(1));
         assert_ne!(noise_of(0), flips(scenario.trial(seeds, 0, 0)));

@@ -70,7 +70,7 @@ pub struct World {
     grid: Grid,
     board: Board,
     offsets: [[isize; MAX_SENSORS]; 4],
-    sensors: usize,
+    model: SensorModel,
     poses: Vec<Pose>,
     states: Vec<State>,
     readings: Vec<SensorBits>,
@@ -95,7 +95,7 @@ impl World {
             grid,
             offsets: Heading::ALL.map(|heading| board.offsets(model, heading)),
             board,
-            sensors: model.sensors(),
+            model,
             poses: starts.to_vec(),
             states: vec![State::new(controller); starts.len()],
             readings: vec![SensorBits::NONE; starts.len()],
@@ -136,12 +136,13 @@ impl World {
     }
 
     fn sense(&mut self, noise: &mut NoiseStream) {
+        let sensors = self.model.sensors();
         for (pose, reading) in self.poses.iter().zip(&mut self.readings) {
             let offsets = &self.offsets[pose.heading as usize];
-            let bits = self.board.sense(pose.x, pose.y, &offsets[..self.sensors]);
+            let bits = self.board.sense(pose.x, pose.y, &offsets[..sensors]);
             *reading = SensorBits::new(bits);
         }
-        noise.flip(self.step, &mut self.readings);
+        noise.flip(self.step, self.model.mask(), &mut self.readings);
     }
 
     /// Cells are taken at once and vacated at the end of the step.
@@ -184,7 +185,7 @@ impl World {
         &self.states
     }
 
-    /// What the robots sensed in the last step, noise included.
+    /// What the robots sensed in the last step, noise included; no bit beyond the model's sensors.
     #[must_use]
     pub fn readings(&self) -> &[SensorBits] {
         &self.readings

@@ -4,6 +4,7 @@ pub mod browser;
 pub mod firmware;
 pub mod genome;
 pub mod golden;
+pub mod noisy_run;
 pub mod program;
 #[cfg(target_os = "linux")]
 pub mod pty;

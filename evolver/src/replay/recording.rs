@@ -6,14 +6,14 @@
 
 use crate::finished_run::FinishedRun;
 use crate::settings::Settings;
-use crate::steps_hash::StepsHash;
+use crate::steps_hash::{RecordedHash, StepsHash, Version};
 use minimal_surprise_controller::{Controller, Genome, SensorBits, State, Topology};
 use minimal_surprise_sim::damage::{Damage, DamageError};
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::metrics::Measures;
 use minimal_surprise_sim::noise::NoiseStream;
-use minimal_surprise_sim::structures::{Structure, classify};
+use minimal_surprise_sim::structures::{Membership, Structure, classify};
 use minimal_surprise_sim::{Area, Grid, Pose, Scenario, Trace, TraceStep, Trial, WorldError};
 use rayon::prelude::*;
 
@@ -26,9 +26,8 @@ pub struct Recording {
     pub trace: Trace,
     /// What the robots are; nothing is known of those of a trajectory.
     pub minds: Option<Minds>,
-    /// For every state and robot, the structures that it belongs to: bit `i` for
-    /// `Structure::ALL[i]`.
-    pub members: Vec<Vec<u8>>,
+    /// For every state and robot, the structures that it belongs to.
+    pub members: Vec<Vec<Membership>>,
     /// The structures that the run is named after, those of its final state, or of the state before
     /// it was damaged; several if tied.
     pub names: Vec<Structure>,
@@ -64,8 +63,8 @@ pub struct Origin {
     pub seed: Option<u64>,
     /// Hash of the evolution.
     pub run_hash: Option<String>,
-    /// The hash of the steps that the run wrote down, for comparison.
-    pub steps_hash: Option<String>,
+    /// The hash of the steps that the run recorded, for comparison.
+    pub steps_hash: Option<RecordedHash>,
     /// Sensor noise: the probability that a bit is flipped.
     pub noise: f64,
     /// Best fitness of every generation of the evolution; empty if it is not known.
@@ -133,7 +132,9 @@ impl Recording {
         let grid = scenario.grid();
         let topology = controller.topology();
         let mut measures = Measures::starting_from(grid, topology, &trial.starts);
-        let mut hash = StepsHash::starting_from(&trial.starts);
+        let recorded = origin.steps_hash.as_ref();
+        let version = recorded.map_or_else(Version::default, |recorded| recorded.version);
+        let mut hash = StepsHash::new(version, trial, topology.model());
         let mut fitness = Vec::new();
         let mut trace = Trace {
             steps: Vec::new(),
@@ -202,7 +203,7 @@ impl Recording {
         let states: Vec<&Vec<Pose>> = trace.steps.iter().map(|s| &s.poses).chain(last).collect();
         let members = states
             .par_iter()
-            .map(|poses| members(grid, poses))
+            .map(|poses| classify(grid, poses).map(|found| found.memberships()))
             .collect::<Result<_, _>>()?;
         Ok(Self {
             names: classify(grid, &trace.final_poses)?.names(),
@@ -240,10 +241,7 @@ impl Recording {
     /// What a robot sensed in step `t`, noise included; none in the last state and of a trajectory.
     #[must_use]
     pub fn sensed(&self, t: usize, robot: usize) -> Option<SensorBits> {
-        let reading = self.trace.steps.get(t)?.readings.get(robot)?;
-        // Noise flips bits beyond the model's sensors too, which nobody looks at.
-        let sensors = self.minds.as_ref()?.topology.model().mask();
-        Some(SensorBits::new(reading.bits() & sensors.bits()))
+        self.trace.steps.get(t)?.readings.get(robot).copied()
     }
 
     /// What a robot expects to sense in state `t`; none of a trajectory.
@@ -262,7 +260,7 @@ impl Recording {
     #[must_use]
     pub fn is_member(&self, t: usize, robot: usize, structure: Structure) -> bool {
         let members = self.members.get(t).and_then(|robots| robots.get(robot));
-        members.is_some_and(|&members| is_in(members, structure))
+        members.is_some_and(|members| members.contains(structure))
     }
 
     /// The structure that the run is named after, of tied ones the first in the paper's
@@ -302,22 +300,4 @@ fn origin(name: &str, finished: &FinishedRun) -> Origin {
         evolution: finished.best_fitness.clone(),
         ..Origin::default()
     }
-}
-
-/// The structures that every robot belongs to: bit `i` for `Structure::ALL[i]`.
-pub(super) fn members(grid: Grid, poses: &[Pose]) -> Result<Vec<u8>, WorldError> {
-    let found = classify(grid, poses)?;
-    Ok((0..poses.len() as u32)
-        .map(|robot| {
-            (0..).zip(Structure::ALL).fold(0, |bits, (bit, structure)| {
-                bits | u8::from(found.contains(structure, robot)) << bit
-            })
-        })
-        .collect())
-}
-
-/// Whether a robot of [`members`] belongs to a structure.
-pub(super) fn is_in(members: u8, structure: Structure) -> bool {
-    let bit = Structure::ALL.iter().position(|&s| s == structure);
-    bit.is_some_and(|bit| members >> bit & 1 == 1)
 }

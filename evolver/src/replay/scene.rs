@@ -2,8 +2,9 @@
 //! marked on the cells. Every back end draws scenes and knows nothing else of a run; the page has
 //! this file's rules once more in its script, and a test compares the two.
 
-use super::recording::{Recording, is_in, members};
+use super::recording::Recording;
 use minimal_surprise_controller::SensorBits;
+use minimal_surprise_sim::structures::classify;
 use minimal_surprise_sim::{Pose, Structure};
 use serde::Serialize;
 
@@ -128,13 +129,15 @@ impl Scene {
     #[must_use]
     pub fn of_poses(recording: &Recording, poses: &[Pose], colouring: Colouring) -> Self {
         let members = match colouring {
-            Colouring::Structure => members(recording.grid, poses).unwrap_or_default(),
+            Colouring::Structure => classify(recording.grid, poses)
+                .map(|found| found.memberships())
+                .unwrap_or_default(),
             Colouring::Surprise | Colouring::Plain => Vec::new(),
         };
         let robots = poses.iter().enumerate();
         let robots = robots.map(|(robot, &pose)| {
-            let ink = members.get(robot).map_or(Ink::Plain, |&members| {
-                ink_of_member(|s| is_in(members, s), recording.name())
+            let ink = members.get(robot).map_or(Ink::Plain, |members| {
+                ink_of_member(|s| members.contains(s), recording.name())
             });
             robot_at(pose, ink)
         });

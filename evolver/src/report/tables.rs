@@ -44,7 +44,7 @@ pub fn meta(settings: &Settings) -> String {
 struct FinalState<'a> {
     schema_version: u32,
     hash: String,
-    steps_hash: String,
+    steps_hash_v2: String,
     seed: u64,
     grid: &'a str,
     sensor_model: &'a str,
@@ -71,7 +71,7 @@ pub fn final_state(settings: &Settings, finding: &Finding) -> String {
     pretty(&FinalState {
         schema_version: SCHEMA_VERSION,
         hash: finding.hash.to_string(),
-        steps_hash: finding.steps_hash.to_string(),
+        steps_hash_v2: finding.steps_hash.to_string(),
         seed: settings.seed,
         grid: &written.grid,
         sensor_model: &written.sensor_model,

@@ -47,7 +47,8 @@ impl<'a> Drawer<'a> {
     fn draw(&mut self, step: usize, robots: usize) -> &[u16] {
         self.readings.clear();
         self.readings.resize(robots, SensorBits::NONE);
-        self.noise.flip(step as u32, &mut self.readings);
+        let sensors = self.order.model().mask();
+        self.noise.flip(step as u32, sensors, &mut self.readings);
         self.row.clear();
         let order = self.order;
         self.row

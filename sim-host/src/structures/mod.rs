@@ -70,6 +70,34 @@ impl Structure {
     }
 }
 
+/// The structures that a robot belongs to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Membership(u8);
+
+// Every structure has a bit, and its place in `Structure::ALL` is the bit's number.
+const _: () = {
+    assert!(Structure::ALL.len() <= u8::BITS as usize);
+    let mut bit = 0;
+    while bit < Structure::ALL.len() {
+        assert!(Structure::ALL[bit] as usize == bit);
+        bit += 1;
+    }
+};
+
+impl Membership {
+    /// Whether the robot belongs to a structure.
+    #[must_use]
+    pub fn contains(self, structure: Structure) -> bool {
+        self.0 >> structure as u8 & 1 == 1
+    }
+
+    /// Bit `i` for `Structure::ALL[i]`.
+    #[must_use]
+    pub fn bits(self) -> u8 {
+        self.0
+    }
+}
+
 impl Structure {
     /// What similarity to an earlier state goes by: triangular lattices are compared by cells,
     /// since their robots keep turning, everything else by poses (paper, Sec. 3.4).
@@ -156,6 +184,19 @@ impl Structures {
     pub fn contains(&self, structure: Structure, robot: u32) -> bool {
         self.members(structure)
             .is_some_and(|members| members.get(robot as usize) == Some(&true))
+    }
+
+    /// The structures that every robot belongs to, robot 0 first.
+    #[must_use]
+    pub fn memberships(&self) -> Vec<Membership> {
+        let mut memberships = vec![Membership::default(); self.swarm_size as usize];
+        for structure in Structure::ALL {
+            let members = self.members(structure).unwrap_or_default();
+            for (membership, &member) in memberships.iter_mut().zip(members) {
+                membership.0 |= u8::from(member) << structure as u8;
+            }
+        }
+        memberships
     }
 
     /// Indices of the robots that belong to a structure, ascending.

@@ -843,3 +843,19 @@ fn structures_stay_the_same_when_the_swarm_is_shifted_turned_or_renumbered() {
     println!("members met: {seen:?}");
     assert!(seen[..6].iter().all(|&count| count > 0));
 }
+
+#[test]
+fn memberships_are_those_of_every_structure() {
+    let grid = Grid::new(15, 15).unwrap();
+    for start in 0..20 {
+        let stream = &mut SeedTree::new(2).stream(Purpose::Starts, 0, start);
+        let found = classify(grid, &random_poses(grid, 90, stream)).unwrap();
+        for (robot, membership) in (0..).zip(found.memberships()) {
+            for (bit, structure) in (0..).zip(Structure::ALL) {
+                let member = found.contains(structure, robot);
+                assert_eq!(membership.contains(structure), member);
+                assert_eq!(membership.bits() >> bit & 1, u8::from(member));
+            }
+        }
+    }
+}

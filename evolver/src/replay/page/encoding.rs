@@ -146,7 +146,7 @@ fn block(recording: &Recording, layout: Layout, first: usize) -> Vec<u8> {
         }
     }
     bytes.extend(per_state(layout, first, steps, |t, robot| {
-        recording.members[t][robot]
+        recording.members[t][robot].bits()
     }));
     bytes
 }

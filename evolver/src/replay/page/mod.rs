@@ -7,14 +7,14 @@
 pub mod encoding;
 pub mod html;
 
-use super::recording::Recording;
+use super::recording::{Minds, Origin, Recording};
 use super::scene::Ink;
 use super::{palette, scene};
 use crate::settings::model_name;
+use crate::steps_hash::Version;
 use html::Document;
 use minimal_surprise_controller::{Prediction, Topology};
 use minimal_surprise_sim::damage::Damage;
-use minimal_surprise_sim::noise::NoiseStream;
 use minimal_surprise_sim::{Heading, Structure};
 use serde_json::{Value, json};
 
@@ -114,10 +114,10 @@ fn about(recording: &Recording) -> Value {
         "turned": Heading::ALL.map(|heading| html::TURNS.map(|turn| heading.turned(turn))),
         "seed": origin.seed.map(|seed| seed.to_string()),
         "noise": origin.noise,
-        "flips": minds.and_then(|minds| flips(&minds.noise)),
+        "flips": minds.and_then(|minds| flips(minds, origin)),
         "run_hash": origin.run_hash,
-        "recorded_hash": origin.steps_hash,
-        "computed_hash": recording.steps_hash.map(|hash| hash.to_string()),
+        "recorded_hash": origin.steps_hash.as_ref().map(|recorded| &recorded.hash),
+        "computed_hash": recording.steps_hash.as_ref().map(ToString::to_string),
         "hash_start": std::str::from_utf8(crate::steps_hash::START).unwrap_or_default(),
         "area": scene.area,
         "damage": damage,
@@ -128,12 +128,22 @@ fn about(recording: &Recording) -> Value {
 }
 
 /// What the page draws the noise from again; nothing without noise.
-fn flips(noise: &NoiseStream) -> Option<Value> {
-    let key = noise.key();
+fn flips(minds: &Minds, origin: &Origin) -> Option<Value> {
+    let key = minds.noise.key();
     let words = key.as_chunks::<4>().0.iter();
     let words: Vec<u32> = words.map(|&word| u32::from_le_bytes(word)).collect();
-    let rate = noise.rate();
-    (!rate.is_none()).then(|| json!({ "key": words, "per_65536": rate.per_65_536() }))
+    let rate = minds.noise.rate();
+    let sensed = minds.topology.model().mask().bits();
+    let version = origin.steps_hash.as_ref().map(|recorded| recorded.version);
+    let hashed = match version.unwrap_or_default() {
+        Version::V1 => u16::MAX,
+        Version::V2 => sensed,
+    };
+    (!rate.is_none()).then(|| {
+        json!({
+            "key": words, "per_65536": rate.per_65_536(), "sensed": sensed, "hashed": hashed,
+        })
+    })
 }
 
 /// Which inks are drawn as an outline.

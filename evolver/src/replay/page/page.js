@@ -30,7 +30,7 @@ class Recording {
     if (at !== bytes.length) throw new Error('the page is damaged: its data have another length');
     this.keyframes = layout.minds ? this.findKeyframes() : [];
     this.recent = new Map();
-    this.board = new Board();
+    this.board = new Board(about.flips?.sensed);
     this.fitness = new Float64Array(T + 1);
     let missed = 0;
     for (let t = 1; t <= T; t++) {
@@ -140,8 +140,6 @@ class Recording {
     if (this.sensedOf !== t) {
       const { block, from } = this.at(t);
       this.readings = this.board.sense(block, from, this.readings);
-      // Noise flips bits beyond the sensors too, which only the hash covers.
-      for (let robot = 0; robot < R; robot++) this.readings[robot] &= (1 << about.sensors) - 1;
       this.sensedOf = t;
     }
     return this.readings;
@@ -150,11 +148,11 @@ class Recording {
 
 const wrapped = (at, side) => (at < 0 ? at + side : at >= side ? at - side : at);
 
-/* Which cells are taken. */
+/* Which cells are taken. Noise flips the bits of `flipped`. */
 class Board {
-  constructor() {
+  constructor(flipped) {
     this.cells = new Uint8Array(width * height);
-    this.noise = about.flips ? new Noise(about.flips) : null;
+    this.noise = about.flips ? new Noise(about.flips, flipped) : null;
   }
 
   /* What all robots of a state sense, noise included. */
@@ -181,8 +179,9 @@ class Board {
 
 /* The noise of noise.rs: ChaCha8, whose stream is the step; a robot has half of a block. */
 class Noise {
-  constructor({ key, per_65536 }) {
+  constructor({ key, per_65536 }, flipped) {
     this.below = per_65536;
+    this.flipped = flipped;
     this.start = Int32Array.of(0x61707865, 0x3320646e, 0x79622d32, 0x6b206574, ...key, 0, 0, 0, 0);
     this.words = new Int32Array(16);
   }
@@ -192,7 +191,7 @@ class Noise {
     this.start[14] = step;
     for (let robot = 0; robot < R; robot++) {
       if (robot % 2 === 0) this.draw(robot / 2);
-      readings[robot] ^= this.half(8 * (robot % 2));
+      readings[robot] ^= this.half(8 * (robot % 2)) & this.flipped;
     }
   }
 
@@ -308,7 +307,7 @@ async function checkSteps() {
   }
   let hash = await digest(start);
   const step = new Uint8Array(32 + 11 * R);
-  const board = new Board();
+  const board = new Board(about.flips?.hashed);
   const readings = new Uint16Array(R);
   let rested = performance.now();
   for (let number = 0; number < recording.offsets.length; number++) {

@@ -163,7 +163,7 @@ fn draw_title(frame: &mut Frame<'_>, area: Rect, player: &Player<'_>, paints: Pa
     if let Some(hash) = &recording.steps_hash {
         let hash = hash.to_string();
         second.push(match &origin.steps_hash {
-            Some(written) if *written != hash => {
+            Some(recorded) if recorded.hash != hash => {
                 Span::styled("not the steps that the run wrote down", paints.warning())
             }
             _ => format!("steps {}", short(&hash)).into(),
