@@ -1,8 +1,11 @@
-//! Files that are never half-written: written beside, then renamed.
+//! Files that are never half-written: written beside, synced, then renamed.
 
+use sha2::{Digest, Sha256};
+use std::ffi::OsStr;
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use tempfile::TempPath;
 
 /// A file or folder could not be used.
 #[derive(Debug, thiserror::Error)]
@@ -20,37 +23,194 @@ impl FileError {
         let path = path.to_owned();
         move |error| Self { path, error }
     }
+
+    /// There is something already.
+    #[must_use]
+    pub fn exists(path: &Path) -> Self {
+        let error = io::Error::new(ErrorKind::AlreadyExists, "it exists already");
+        Self::at(path)(error)
+    }
+
+    /// Whether nothing was written because there is something already.
+    #[must_use]
+    pub fn is_exists(&self) -> bool {
+        self.error.kind() == ErrorKind::AlreadyExists
+    }
+
+    /// Whether another path would do, as opposed to something that broke.
+    #[must_use]
+    pub fn is_bad_path(&self) -> bool {
+        use ErrorKind as Kind;
+        matches!(
+            self.error.kind(),
+            Kind::AlreadyExists
+                | Kind::InvalidFilename
+                | Kind::InvalidInput
+                | Kind::IsADirectory
+                | Kind::NotADirectory
+                | Kind::NotFound
+                | Kind::PermissionDenied
+                | Kind::ReadOnlyFilesystem
+        )
+    }
 }
 
-/// What [`beside`] ends its names with.
-pub const PART: &str = ".part";
+/// What to do where there is something already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Existing {
+    /// Write nothing.
+    Refuse,
+    /// Replace a file; in a folder, files of the same names.
+    Replace,
+}
 
-/// A name beside a path, for what is to be renamed to it. It is drawn: process ids are the same on
-/// two machines that share a file system.
+impl Existing {
+    /// As the flag `--overwrite` says.
+    #[must_use]
+    pub fn with_overwrite(overwrite: bool) -> Self {
+        if overwrite {
+            Self::Replace
+        } else {
+            Self::Refuse
+        }
+    }
+}
+
+/// What names of temporary files and directories end with.
+const PART: &str = ".part";
+
+/// A name beside a path, for what is to be renamed to it: a hash of the final name, and a random
+/// number, because process ids are the same on two machines that share a file system. It has the
+/// same length for every name.
 #[must_use]
 pub fn beside(path: &Path) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = path.file_name().unwrap_or_default();
+    let hash = Sha256::digest(name.as_encoded_bytes());
+    let hash = u64::from_be_bytes(hash[..8].try_into().expect("a SHA-256 has 32 bytes"));
     let number: u64 = rand::random();
-    path.with_file_name(format!(".{name}.{number:016x}{PART}"))
+    path.with_file_name(format!(".{hash:016x}.{number:016x}{PART}"))
 }
 
-/// Replaces a file as a whole: after a kill at any moment there is the old one or the new one.
+/// Whether a name is one of [`beside`], so that nobody is meant to look inside.
+#[must_use]
+pub fn is_part(name: &OsStr) -> bool {
+    let name = name.as_encoded_bytes();
+    name.starts_with(b".") && name.ends_with(PART.as_bytes())
+}
+
+/// The directory that a path is in.
+#[must_use]
+pub fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// Writes a file as [`Existing`] says.
+///
+/// # Errors
+/// As [`create`] and [`replace`].
+pub fn write(path: &Path, contents: &[u8], existing: Existing) -> Result<(), FileError> {
+    match existing {
+        Existing::Refuse => create(path, contents),
+        Existing::Replace => replace(path, contents),
+    }
+}
+
+/// Writes a file that must not exist yet. Under its name it is complete from the first moment, and
+/// it replaces nothing, even what has just appeared. On a file system that has neither hard links
+/// nor a rename that replaces nothing, an empty file reserves the name for the moment before.
+///
+/// # Errors
+/// [`FileError`] if it exists ([`FileError::is_exists`]) or cannot be written; nothing is left then.
+pub fn create(path: &Path, contents: &[u8]) -> Result<(), FileError> {
+    if path.symlink_metadata().is_ok() {
+        return Err(FileError::exists(path));
+    }
+    let create = || {
+        let refused = match write_beside(path, contents, None)?.persist_noclobber(path) {
+            Ok(()) => return Ok(()),
+            Err(refused) if refused.error.kind() == ErrorKind::AlreadyExists => {
+                return Err(refused.error);
+            }
+            Err(refused) => refused,
+        };
+        File::create_new(path)?;
+        refused.path.persist(path).map_err(|refused| {
+            // It is empty and ours; the error that matters is the first.
+            let _ = fs::remove_file(path);
+            refused.error
+        })
+    };
+    create().map_err(FileError::at(path))
+}
+
+/// Replaces a file as a whole: after a kill at any moment there is the old one or the new one, with
+/// the permissions of the old one. A symbolic link stays, and what it points to is replaced. What
+/// cannot be replaced is written to instead: a device, a pipe, a file that is mounted.
 ///
 /// # Errors
 /// [`FileError`] if it cannot be written; the old file is then still there.
 pub fn replace(path: &Path, contents: &[u8]) -> Result<(), FileError> {
-    let beside = beside(path);
-    let write = || {
-        let mut file = File::create_new(&beside)?;
-        file.write_all(contents)?;
-        file.sync_data()?;
-        fs::rename(&beside, path)
+    let replace = || {
+        let old = fs::metadata(path).ok();
+        let is_file = old.as_ref().is_some_and(fs::Metadata::is_file);
+        if old.as_ref().is_some_and(|old| !is_file && !old.is_dir()) {
+            return write_to(path, contents);
+        }
+        let target = target(path)?;
+        let permissions = old.map(|old| old.permissions());
+        let written = write_beside(&target, contents, permissions)
+            .and_then(|part| part.persist(&target).map_err(|refused| refused.error));
+        match written.as_ref().map_err(io::Error::kind) {
+            // A mount point cannot be renamed to, and what it is mounted in may be read-only.
+            Err(ErrorKind::ResourceBusy | ErrorKind::ReadOnlyFilesystem) if is_file => {
+                write_to(&target, contents)
+            }
+            _ => written,
+        }
     };
-    write().map_err(|error| {
-        // The half-written copy is of no use; that it cannot be removed changes nothing.
-        let _ = fs::remove_file(&beside);
-        FileError::at(path)(error)
-    })
+    replace().map_err(FileError::at(path))
+}
+
+/// Writes a new file beside a path, which goes again unless it is renamed.
+fn write_beside(
+    path: &Path,
+    contents: &[u8],
+    permissions: Option<fs::Permissions>,
+) -> io::Result<TempPath> {
+    let part = beside(path);
+    let mut file = File::create_new(&part)?;
+    let part = TempPath::try_from_path(part)?;
+    if let Some(permissions) = permissions
+        && permissions != file.metadata()?.permissions()
+    {
+        file.set_permissions(permissions)?;
+    }
+    file.write_all(contents)?;
+    file.sync_data()?;
+    Ok(part)
+}
+
+/// Writes to what is there.
+fn write_to(path: &Path, contents: &[u8]) -> io::Result<()> {
+    let mut file = File::options().write(true).truncate(true).open(path)?;
+    file.write_all(contents)
+}
+
+/// What symbolic links at the end of a path lead to, whether it exists or not.
+fn target(path: &Path) -> io::Result<PathBuf> {
+    let mut target = path.to_owned();
+    // As many as Linux follows.
+    for _ in 0..40 {
+        match fs::read_link(&target) {
+            Ok(next) => target = parent(&target).join(next),
+            Err(_) => return Ok(target),
+        }
+    }
+    // A loop, which says so itself.
+    fs::metadata(path).map(|_| target)
 }
 
 /// Most bytes of a file that a person writes, or that says a few things about a run: settings,
@@ -100,4 +260,105 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
         Ok(bytes)
     };
     read().map_err(FileError::at(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<PathBuf> {
+        let entries = fs::read_dir(folder).unwrap();
+        entries.map(|entry| entry.unwrap().path()).collect()
+    }
+
+    #[test]
+    fn a_name_as_long_as_file_systems_take_can_be_written_and_replaced() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("x".repeat(255));
+        create(&path, b"old").unwrap();
+        assert!(create(&path, b"new").unwrap_err().is_exists());
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        replace(&path, b"new").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(names(scratch.path()), [path]);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_name_that_is_not_utf_8_can_be_written_and_replaced() {
+        use std::os::unix::ffi::OsStrExt;
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join(OsStr::from_bytes(b"a\xff"));
+        create(&path, b"old").unwrap();
+        replace(&path, b"new").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        let hash = |name: &OsStr| beside(Path::new(name)).to_string_lossy()[..18].to_owned();
+        assert_ne!(
+            hash(OsStr::from_bytes(b"a\xff")),
+            hash(OsStr::from_bytes(b"a\xfe"))
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn through_a_symbolic_link_its_target_is_replaced() {
+        use std::os::unix::fs::symlink;
+        let scratch = tempfile::tempdir().unwrap();
+        let at = |name: &str| scratch.path().join(name);
+        fs::create_dir(at("folder")).unwrap();
+        symlink("folder/second", at("first")).unwrap();
+        symlink("../file", at("folder/second")).unwrap();
+        for contents in [b"new".as_slice(), b"newer"] {
+            // The first time there is nothing at the end.
+            replace(&at("first"), contents).unwrap();
+            assert_eq!(fs::read(at("file")).unwrap(), contents);
+        }
+        assert!(at("first").is_symlink() && at("folder/second").is_symlink());
+        assert!(create(&at("first"), b"").unwrap_err().is_exists());
+        symlink("loop", at("loop")).unwrap();
+        let error = replace(&at("loop"), b"").unwrap_err().to_string();
+        assert!(error.contains("symbolic link"), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_replaced_file_keeps_its_permissions() {
+        use std::os::unix::fs::PermissionsExt;
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("file");
+        create(&path, b"old").unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
+        replace(&path, b"new").unwrap();
+        assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o600);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_stays_one_and_says_when_it_is_full() {
+        use std::os::unix::fs::FileTypeExt;
+        let error = replace(Path::new("/dev/full"), b"text").unwrap_err();
+        assert_eq!(error.error.kind(), ErrorKind::StorageFull, "{error}");
+        replace(Path::new("/dev/null"), b"text").unwrap();
+        let null = fs::metadata("/dev/null").unwrap();
+        assert!(null.file_type().is_char_device());
+    }
+
+    #[test]
+    fn of_many_who_create_one_file_one_succeeds_and_nobody_sees_half_of_it() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("file");
+        let texts: Vec<Vec<u8>> = (b'a'..=b'h').map(|letter| vec![letter; 100_000]).collect();
+        let created = std::thread::scope(|scope| {
+            let path = &path;
+            let writers = texts.iter();
+            let writers = writers.map(|text| scope.spawn(move || create(path, text).is_ok()));
+            let writers: Vec<_> = writers.collect();
+            while !path.exists() {}
+            assert!(texts.contains(&fs::read(path).unwrap()));
+            let ended = writers.into_iter().map(|writer| writer.join().unwrap());
+            ended.filter(|created| *created).count()
+        });
+        assert_eq!(created, 1);
+        assert_eq!(names(scratch.path()), [path]);
+    }
 }

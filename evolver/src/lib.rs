@@ -20,6 +20,8 @@ pub mod files;
 pub mod finished_run;
 pub mod generation_work;
 pub mod hil;
+pub mod lock;
+pub mod new_dir;
 pub mod reevaluation;
 pub mod replay;
 pub mod report;

@@ -17,11 +17,13 @@ use crate::checkpoint::{self, CheckpointError};
 use crate::experiment::{Experiment, Finding};
 use crate::files::{self, DATA_BYTES_MAX, FileError, TEXT_BYTES_MAX};
 use crate::finished_run::{ReadRunError, is_complete};
+use crate::lock::{Holder, LOCK, Lock, LockError};
+use crate::new_dir::NewDir;
 use crate::report::tables;
 use crate::settings::{Given, SettingError, Settings};
 use crate::time_spent::{TimeSpent, Timer};
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
-use std::fs::{self, File, TryLockError};
+use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -34,7 +36,7 @@ pub struct RunDir {
     /// Whether the table is kept until the run is complete.
     table_last: bool,
     /// Holds the lock for as long as it lives.
-    _lock: Option<File>,
+    _lock: Option<Lock>,
 }
 
 /// An evolution between two generations, ready to be written.
@@ -62,9 +64,14 @@ pub enum RunDirError {
     /// The run is marked complete, and is not.
     #[error(transparent)]
     Damaged(#[from] ReadRunError),
-    /// Another process is at it.
-    #[error("another process is working in {}", .0.display())]
-    InUse(PathBuf),
+    /// Another process works on the run.
+    #[error("{} is in use by {}", path.display(), by(holder.as_ref()))]
+    InUse {
+        /// The directory.
+        path: PathBuf,
+        /// Who it is, if its lock says so.
+        holder: Option<Holder>,
+    },
     /// A file cannot be used.
     #[error(transparent)]
     File(#[from] FileError),
@@ -89,7 +96,6 @@ impl RunDirError {
     }
 }
 
-const LOCK: &str = ".lock";
 const CHECKPOINT: &str = "checkpoint";
 const CONFIG: &str = "config.toml";
 const META: &str = "meta.json";
@@ -114,37 +120,22 @@ impl RunDir {
     /// # Errors
     /// [`RunDirError::Exists`], or a file that cannot be written.
     pub fn create(path: &Path, experiment: &Experiment) -> Result<Self, RunDirError> {
-        if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
-            fs::create_dir_all(parent).map_err(FileError::at(parent))?;
-        }
-        if path.exists() {
-            return Err(RunDirError::Exists(path.to_owned()));
-        }
-        let part = files::beside(path);
-        remove_abandoned_parts(path);
-        fs::create_dir(&part).map_err(FileError::at(&part))?;
+        let new = NewDir::beside(path).map_err(exists_or_file)?;
         let settings_text = toml::to_string(&experiment.settings().written)
             .expect("settings are plain numbers and strings");
         let mut run = Self {
-            _lock: lock(&part)?,
-            path: part.clone(),
+            path: new.path().to_owned(),
             settings_text,
             timer: Timer::after(TimeSpent::default()),
             table_last: false,
+            _lock: None,
         };
         run.save(experiment)?;
         let meta = tables::meta(experiment.settings());
         files::replace(&run.file(META), meta.as_bytes())?;
         files::replace(&run.file(CONFIG), run.settings_text.as_bytes())?;
         // Under its own name from here on, complete: a directory of that name is always a run.
-        if let Err(error) = fs::rename(&part, path) {
-            let _ = fs::remove_dir_all(&part);
-            return Err(if path.exists() {
-                RunDirError::Exists(path.to_owned())
-            } else {
-                FileError::at(path)(error).into()
-            });
-        }
+        run._lock = Some(new.publish_locked().map_err(exists_or_file)?);
         run.path = path.to_owned();
         Ok(run)
     }
@@ -216,7 +207,7 @@ impl RunDir {
             settings_text,
             timer: Timer::after(spent),
             table_last: false,
-            _lock: lock,
+            _lock: Some(lock),
         };
         Ok(Found::Unfinished(Box::new(experiment), run))
     }
@@ -311,8 +302,7 @@ fn tidy(directory: &Path) -> Result<(), FileError> {
     let entries = fs::read_dir(directory).map_err(FileError::at(directory))?;
     for entry in entries.flatten() {
         let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if name == CHECKPOINT || name == LOCK || name.ends_with(files::PART) {
+        if name == CHECKPOINT || name == LOCK || files::is_part(&name) {
             match fs::remove_file(entry.path()) {
                 Err(error) if error.kind() != ErrorKind::NotFound => {
                     return Err(FileError::at(&entry.path())(error));
@@ -324,38 +314,25 @@ fn tidy(directory: &Path) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Removes what processes left behind that ended while they made this directory. What another one
-/// is still making is locked.
-fn remove_abandoned_parts(path: &Path) {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let start = format!(".{name}.");
-    let parent = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if !name.starts_with(&start) || !name.ends_with(files::PART) {
-            continue;
-        }
-        // The lock is not made here: who has just made the directory is about to.
-        let lock = File::options().write(true).open(entry.path().join(LOCK));
-        if lock.is_ok_and(|lock| lock.try_lock().is_ok()) {
-            // It is only in the way of the eye.
-            let _ = fs::remove_dir_all(entry.path());
-        }
+/// Takes the directory for this process.
+fn lock(directory: &Path) -> Result<Lock, RunDirError> {
+    Lock::take(directory).map_err(|error| match error {
+        LockError::Held(holder) => RunDirError::InUse {
+            path: directory.to_owned(),
+            holder,
+        },
+        LockError::File(error) => error.into(),
+    })
+}
+
+fn exists_or_file(error: FileError) -> RunDirError {
+    if error.is_exists() {
+        RunDirError::Exists(error.path)
+    } else {
+        error.into()
     }
 }
 
-/// Takes the directory for this process, where the file system knows locks; where it does not,
-/// there is none to take.
-fn lock(directory: &Path) -> Result<Option<File>, RunDirError> {
-    let path = directory.join(LOCK);
-    let file = File::create(&path).map_err(FileError::at(&path))?;
-    match file.try_lock() {
-        Ok(()) => Ok(Some(file)),
-        Err(TryLockError::WouldBlock) => Err(RunDirError::InUse(directory.to_owned())),
-        Err(TryLockError::Error(_)) => Ok(None),
-    }
+fn by(holder: Option<&Holder>) -> String {
+    holder.map_or_else(|| "another process".to_owned(), Holder::to_string)
 }

@@ -5,7 +5,9 @@ use super::{BadInput, stopped, thread_pool};
 use crate::evolving::until_finished;
 use crate::exit::Exit;
 use crate::experiment::Experiment;
+use crate::files;
 use crate::finished_run::FinishedRun;
+use crate::new_dir::remove_abandoned;
 use crate::replay::recording::Recording;
 use crate::replay::scene::Colouring;
 use crate::replay::terminal;
@@ -175,8 +177,14 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
             let seed = settings.seed;
             let experiment = Experiment::new(settings);
             let run = match settings::out(&given) {
-                Some(path) => RunDir::create(&path, &experiment),
-                None => RunDir::create_named(Path::new("runs"), &experiment),
+                Some(path) => {
+                    remove_abandoned(files::parent(&path));
+                    RunDir::create(&path, &experiment)
+                }
+                None => {
+                    remove_abandoned(Path::new("runs"));
+                    RunDir::create_named(Path::new("runs"), &experiment)
+                }
             }
             .map_err(|error| match given.place("out") {
                 Some(place) => BadInput::new(format!("{place}: {error}")),

@@ -1,8 +1,9 @@
 //! `evolver export`: runs and genomes in the formats of other programs.
 
 use super::evaluate::flag;
-use super::replay::exists;
+use super::replay::write_file;
 use super::{BadInput, genome_file, read_genome};
+use crate::files::Existing;
 use crate::finished_run::FinishedRun;
 use crate::report::embedding::{c_header, intel_hex, probe_rs_line, rust_source, slot};
 use crate::settings::count;
@@ -10,8 +11,7 @@ use clap::{Args, ValueEnum};
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_slots::MADE_WRITE_COUNT_MAX;
-use std::fs::OpenOptions;
-use std::io::{ErrorKind, IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 
 /// What to export, and how.
@@ -88,14 +88,7 @@ pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
             return Err(BadInput::new(missing).into());
         }
         None => crate::output::write_bytes(&bytes),
-        Some(path) => {
-            let file = OpenOptions::new().write(true).create_new(true).open(path);
-            let mut file = file.map_err(|error| match error.kind() {
-                ErrorKind::AlreadyExists => exists("out", path, ""),
-                _ => BadInput::new(format!("--out = {}: {error}", path.display())),
-            })?;
-            file.write_all(&bytes)?;
-        }
+        Some(path) => write_file("out", path, &bytes, Existing::Refuse)?,
     }
     let file = match arguments.format {
         // The genome file is the raw form itself.

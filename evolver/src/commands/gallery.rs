@@ -2,7 +2,8 @@
 
 use super::evaluate::flag;
 use super::{BadInput, thread_pool};
-use crate::replay::gallery::{Existing, write};
+use crate::files::Existing;
+use crate::replay::gallery::write;
 use crate::settings::count;
 use clap::Args;
 use std::path::PathBuf;
@@ -33,11 +34,7 @@ pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<()> {
         Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
         None => None,
     };
-    let existing = if arguments.overwrite {
-        Existing::Overwrite
-    } else {
-        Existing::Refuse
-    };
+    let existing = Existing::with_overwrite(arguments.overwrite);
     let written = thread_pool(threads)?
         .install(|| write(&arguments.directories, &arguments.out, existing))
         .map_err(BadInput::new)?;

@@ -2,7 +2,8 @@
 
 use super::BadInput;
 use super::evaluate::flag;
-use crate::files::{self, DATA_BYTES_MAX};
+use crate::files::{self, DATA_BYTES_MAX, FileError};
+use crate::new_dir::{NewDir, remove_abandoned};
 use crate::settings::{Given, describe, resolve_topology};
 use clap::Args;
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
@@ -10,7 +11,6 @@ use minimal_surprise_controller::{Prediction, Provenance, SensorModel, Template,
 use minimal_surprise_sim::exchange::{
     ExchangeError, GenomeRows, ImportedGenome, import_genome, read_genomes,
 };
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The text files, and what they hold.
@@ -92,13 +92,7 @@ pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
                 .collect();
             BadInput::new(format!("{}: {error}", files.join(", ")))
         })?;
-    match fs::create_dir(&arguments.out) {
-        Err(error) => {
-            let out = arguments.out.display();
-            return Err(BadInput::new(format!("--out = {out}: {error}")).into());
-        }
-        Ok(()) => write(&arguments.out, &imported)?,
-    }
+    write(&arguments.out, &imported)?;
     show!("{}", report(topology, &arguments.out, &imported));
     Ok(())
 }
@@ -136,7 +130,13 @@ fn topology(arguments: &ImportArgs, action: &[GenomeRows]) -> Result<Topology, B
     Ok(topology)
 }
 
-fn write(directory: &Path, imported: &[(u32, ImportedGenome)]) -> anyhow::Result<()> {
+fn write(out: &Path, imported: &[(u32, ImportedGenome)]) -> anyhow::Result<()> {
+    let refused = |error: FileError| match error.is_bad_path() {
+        true => BadInput::new(format!("--out = {error}")).into(),
+        false => anyhow::Error::from(error),
+    };
+    remove_abandoned(files::parent(out));
+    let new = NewDir::beside(out).map_err(refused)?;
     for (generation, imported) in imported {
         let provenance = Provenance {
             generation: *generation,
@@ -144,9 +144,9 @@ fn write(directory: &Path, imported: &[(u32, ImportedGenome)]) -> anyhow::Result
         };
         let mut buffer = [0; CONTAINER_BYTES_MAX];
         let bytes = codec::encode(&imported.genome, provenance, &mut buffer)?;
-        files::replace(&directory.join(name(*generation)), bytes)?;
+        files::create(&new.path().join(name(*generation)), bytes)?;
     }
-    Ok(())
+    new.publish().map_err(refused)
 }
 
 fn name(generation: u32) -> String {

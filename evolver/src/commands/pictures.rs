@@ -2,8 +2,8 @@
 
 use super::BadInput;
 use super::evaluate::flag;
-use super::replay::refuse_existing;
-use crate::files;
+use super::replay::{refuse_existing, write_file};
+use crate::files::Existing;
 use crate::replay::palette::{DARK, LIGHT, Theme};
 use crate::replay::pictures::film::Film;
 use crate::replay::pictures::raster::png;
@@ -142,7 +142,12 @@ impl PictureArgs {
     ///
     /// # Errors
     /// [`BadInput`] names the flag, the value and what would be valid.
-    pub(super) fn write(&self, recording: &Recording, colouring: Colouring) -> anyhow::Result<()> {
+    pub(super) fn write(
+        &self,
+        recording: &Recording,
+        colouring: Colouring,
+        existing: Existing,
+    ) -> anyhow::Result<()> {
         let width = flag("width-mm", &self.width_mm, |text| between(text, 40, 500))?;
         let dpi = flag("dpi", &self.dpi, |text| between(text, 50, 1200))?;
         let cell = flag("cell-px", &self.cell_px, |text| between(text, 4, 64))?;
@@ -184,7 +189,7 @@ impl PictureArgs {
         if self.svg.is_some() || self.png.is_some() {
             let look = look(Size::Paper(f64::from(width)));
             let drawing = still(recording, what, at, &look).map_err(|error| self.about(error))?;
-            self.write_still(&drawing, dpi)?;
+            self.write_still(&drawing, dpi, existing)?;
         }
         let look = look(Size::Screen(cell));
         let film = Film {
@@ -194,11 +199,12 @@ impl PictureArgs {
             frames_per_second: fps,
         };
         if let Some(file) = &self.gif {
-            write(file, &film.gif().map_err(|error| self.about(error))?)?;
+            let bytes = film.gif().map_err(|error| self.about(error))?;
+            write_file("gif", file, &bytes, existing)?;
         }
         if let Some(file) = &self.mp4 {
             match film.mp4() {
-                Ok(bytes) => write(file, &bytes)?,
+                Ok(bytes) => write_file("mp4", file, &bytes, existing)?,
                 Err(error @ (PictureError::Ffmpeg(_) | PictureError::FfmpegFailed(_))) => {
                     return Err(error.into());
                 }
@@ -208,12 +214,13 @@ impl PictureArgs {
         Ok(())
     }
 
-    fn write_still(&self, drawing: &Drawing, dpi: u32) -> anyhow::Result<()> {
+    fn write_still(&self, drawing: &Drawing, dpi: u32, existing: Existing) -> anyhow::Result<()> {
         if let Some(file) = &self.svg {
-            write(file, drawing.svg().as_bytes())?;
+            write_file("svg", file, drawing.svg().as_bytes(), existing)?;
         }
         if let Some(file) = &self.png {
-            write(file, &png(drawing, dpi).map_err(|error| self.about(error))?)?;
+            let bytes = png(drawing, dpi).map_err(|error| self.about(error))?;
+            write_file("png", file, &bytes, existing)?;
         }
         Ok(())
     }
@@ -237,10 +244,6 @@ impl PictureArgs {
             _ => BadInput::new(error),
         }
     }
-}
-
-fn write(file: &Path, bytes: &[u8]) -> Result<(), BadInput> {
-    files::replace(file, bytes).map_err(BadInput::new)
 }
 
 fn number(text: &str) -> Result<u32, String> {

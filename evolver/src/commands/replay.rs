@@ -5,7 +5,7 @@ use super::damage::corners;
 use super::evaluate::flag;
 use super::pictures::PictureArgs;
 use super::{BadInput, read_genome};
-use crate::files::{self, DATA_BYTES_MAX};
+use crate::files::{self, DATA_BYTES_MAX, Existing};
 use crate::finished_run::FinishedRun;
 use crate::replay::page::page;
 use crate::replay::recording::{Origin, Recording};
@@ -73,6 +73,7 @@ pub struct ReplayArgs {
 /// [`BadInput`] if there is nothing to look at, or a flag does not fit.
 pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
     let overwrite = arguments.overwrite;
+    let existing = Existing::with_overwrite(overwrite);
     if let Some(file) = &arguments.html {
         refuse_existing("html", file, overwrite)?;
     }
@@ -88,11 +89,13 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
     if let Some(file) = &arguments.html {
         let page = page(&recording, arguments.colour, None)
             .map_err(|error| BadInput::new(format!("{}: {error}", arguments.run.display())))?;
-        files::replace(file, page.as_bytes()).map_err(BadInput::new)?;
+        write_file("html", file, page.as_bytes(), existing)?;
         show_line!("{} ({} KB)", file.display(), page.len().div_ceil(1000));
     }
     if arguments.pictures.is_any() {
-        arguments.pictures.write(&recording, arguments.colour)?;
+        arguments
+            .pictures
+            .write(&recording, arguments.colour, existing)?;
     } else if arguments.html.is_none() {
         // In the terminal Ctrl-C is a key; this is for those who are not at its keyboard.
         on_signal(ask_to_stop)?;
@@ -128,11 +131,25 @@ pub(super) fn refuse_existing(flag: &str, path: &Path, overwrite: bool) -> Resul
 }
 
 /// There is something where a flag says to write.
-pub(super) fn exists(flag: &str, path: &Path, or_else: &str) -> BadInput {
+fn exists(flag: &str, path: &Path, or_else: &str) -> BadInput {
     BadInput::new(format!(
         "--{flag} = {}: it exists; name another{or_else}",
         path.display()
     ))
+}
+
+/// Writes a file that a flag names.
+pub(super) fn write_file(
+    flag: &str,
+    path: &Path,
+    contents: &[u8],
+    existing: Existing,
+) -> anyhow::Result<()> {
+    files::write(path, contents, existing).map_err(|error| match error {
+        error if error.is_exists() => exists(flag, path, "").into(),
+        error if error.is_bad_path() => BadInput::new(format!("--{flag} = {error}")).into(),
+        error => error.into(),
+    })
 }
 
 fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {

@@ -3,9 +3,9 @@
 use super::evaluate::flag;
 use super::{BadInput, stopped, thread_pool};
 use crate::exit::Exit;
-use crate::files;
+use crate::files::{self, Existing};
 use crate::finished_run::ReadRunError;
-use crate::replay::gallery::{self, Existing};
+use crate::replay::gallery;
 use crate::report::progress::ProgressMode;
 use crate::report::suite_progress::{SearchProgress, SuiteProgress};
 use crate::report::summary::shell_word;
@@ -317,7 +317,7 @@ fn write_gallery(finished: &[PathBuf], out: &Path) -> anyhow::Result<()> {
     if let Some(parent) = out.parent() {
         fs::create_dir_all(parent).map_err(files::FileError::at(parent))?;
     }
-    let written = gallery::write(finished, out, Existing::Overwrite)?;
+    let written = gallery::write(finished, out, Existing::Replace)?;
     show_line!(
         "{} runs, {:.1} MB; {}",
         written.runs,

@@ -123,7 +123,7 @@ fn begin_or_go_on(
     let (mut experiment, held) = match open(run, &directory) {
         Ok(Some(opened)) => opened,
         Ok(None) => return Ok(Worked::Completed),
-        Err(RunDirError::InUse(_)) => return Ok(Worked::Elsewhere),
+        Err(RunDirError::InUse { .. }) => return Ok(Worked::Elsewhere),
         Err(error) => return Err(error),
     };
     let path = CodePath::from_environment().unwrap_or_else(|_| CodePath::best());

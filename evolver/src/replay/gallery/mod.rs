@@ -8,8 +8,9 @@ use super::page::{self, PageError, encoding, prediction_name};
 use super::palette;
 use super::recording::Recording;
 use super::scene::{Colouring, Ink, Scene};
-use crate::files::{self, FileError};
+use crate::files::{self, Existing, FileError};
 use crate::finished_run::{FinishedRun, ReadRunError};
+use crate::new_dir::{NewDir, remove_abandoned};
 use crate::settings::model_name;
 use minimal_surprise_sim::Structure;
 use rayon::prelude::*;
@@ -69,17 +70,9 @@ pub struct Written {
     pub bytes: u64,
 }
 
-/// Whether pages of an earlier gallery may be replaced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Existing {
-    /// Nothing is written where there is something.
-    Refuse,
-    /// Pages are replaced one by one; other files stay.
-    Overwrite,
-}
-
 /// Writes the gallery of all runs in some directories: run directories, or directories that hold
-/// run directories.
+/// run directories. A new gallery is there as a whole or not at all; in a folder that exists, pages
+/// are replaced one by one, and other files stay.
 ///
 /// # Errors
 /// [`GalleryError`]; a new folder is then not there.
@@ -88,34 +81,33 @@ pub fn write(
     out: &Path,
     existing: Existing,
 ) -> Result<Written, GalleryError> {
-    let exists = out.symlink_metadata().is_ok();
-    if exists && existing == Existing::Refuse {
+    let exists = || out.symlink_metadata().is_ok();
+    if exists() && existing == Existing::Refuse {
         return Err(GalleryError::Exists(out.to_owned()));
     }
     let found = Found::in_all(directories)?;
     if found.runs.is_empty() {
         return Err(GalleryError::Empty(directories.to_vec()));
     }
-    if exists {
-        let bytes = found.write(out)?;
-        return Ok(found.written(out, bytes));
+    let into_existing = || Ok(found.written(out, found.write(out)?));
+    if exists() {
+        return into_existing();
     }
-    // A new gallery is there as a whole or not at all.
-    let name = out.file_name().unwrap_or_default().to_string_lossy();
-    let beside = out.with_file_name(format!(".{name}.part"));
+    remove_abandoned(files::parent(out));
     let write = || {
-        if beside.exists() {
-            fs::remove_dir_all(&beside).map_err(FileError::at(&beside))?;
-        }
-        fs::create_dir_all(&beside).map_err(FileError::at(&beside))?;
-        let bytes = found.write(&beside)?;
-        fs::rename(&beside, out).map_err(FileError::at(out))?;
+        let new = NewDir::beside(out)?;
+        let bytes = found.write(new.path())?;
+        new.publish()?;
         Ok(found.written(out, bytes))
     };
-    write().inspect_err(|_| {
-        // The half-written folder is of no use; that it cannot be removed changes nothing.
-        let _ = fs::remove_dir_all(&beside);
-    })
+    match write() {
+        // Another process has made it meanwhile.
+        Err(GalleryError::File(error)) if error.is_exists() => match existing {
+            Existing::Refuse => Err(GalleryError::Exists(out.to_owned())),
+            Existing::Replace => into_existing(),
+        },
+        written => written,
+    }
 }
 
 /// Run directories.
@@ -146,7 +138,11 @@ impl Found {
         let at = || FileError::at(directory);
         let mut inside = Vec::new();
         for entry in fs::read_dir(directory).map_err(at())? {
-            inside.push(entry.map_err(at())?.path());
+            let entry = entry.map_err(at())?;
+            // What is still being made is renamed at any moment.
+            if !files::is_part(&entry.file_name()) {
+                inside.push(entry.path());
+            }
         }
         inside.sort();
         for path in inside.iter().filter(|path| path.is_dir()) {

@@ -198,9 +198,7 @@ pub fn may_be_written(out: &Path) -> bool {
     has("report.html", html::MARK)
         || entries.flatten().all(|entry| {
             let name = entry.file_name();
-            let name = name.to_string_lossy();
-            let cut_short = name.starts_with('.') && name.ends_with(files::PART);
-            name == LOOKED_INTO || name == GALLERY || cut_short
+            name == LOOKED_INTO || name == GALLERY || files::is_part(&name)
         })
 }
 
