@@ -12,7 +12,7 @@ use crate::report::summary::shell_word;
 use crate::run_dir::{Found, RunDir, RunDirError};
 use crate::settings::count;
 use crate::signals::stop_on_signal;
-use crate::suite::plan::{Plan, PlannedRun};
+use crate::suite::plan::{Plan, PlannedRun, Runs};
 use crate::suite::report::{self, ReportError};
 use crate::suite::search::{Search, look};
 use crate::suite::work::{Progress, Shard, Worked, progress, work_on};
@@ -244,7 +244,7 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
                 ))
                 .into());
             }
-            let finished = finished(&plan.runs(), &directory).map_err(BadInput::new)?;
+            let finished = finished(plan.runs(), &directory).map_err(BadInput::new)?;
             if finished.is_empty() {
                 return Err(BadInput::new(format!(
                     "{}: no run of this suite is done there; --out names the directory that its \
@@ -290,8 +290,11 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
                 name: &read.suite.name,
                 directory: &std::path::absolute(&directory)?,
                 // A task without a run would only wait in the queue.
-                shards: flag("shards", shards, |text| count(text, 100_000))?
-                    .min(plan.runs().len().max(1) as u32),
+                shards: flag("shards", shards, |text| count(text, 100_000))?.min(
+                    u32::try_from(plan.runs().number())
+                        .unwrap_or(u32::MAX)
+                        .max(1),
+                ),
                 at_once: match at_once {
                     Some(text) => Some(flag("at-once", text, |text| count(text, 100_000))?),
                     None => None,
@@ -328,10 +331,10 @@ fn write_gallery(finished: &[PathBuf], out: &Path) -> anyhow::Result<()> {
 }
 
 /// The directories of the runs that are done.
-fn finished(runs: &[&PlannedRun], directory: &Path) -> Result<Vec<PathBuf>, ReadRunError> {
+fn finished(runs: Runs<'_>, directory: &Path) -> Result<Vec<PathBuf>, ReadRunError> {
     let mut finished = Vec::new();
-    for run in runs {
-        if progress(run, directory)? == Progress::Done {
+    for run in runs.iter() {
+        if progress(&run, directory)? == Progress::Done {
             finished.push(run.directory(directory));
         }
     }
@@ -380,8 +383,8 @@ fn directory(suite: &Suite, choice: &Choice) -> PathBuf {
 fn print_plan(plan: &Plan, suite: &Suite, searches: &[Resilience]) {
     for experiment in &plan.experiments {
         show_line!("{}", experiment.name);
-        for settings in &experiment.settings {
-            show_line!("  {:<40} {:>4} runs", settings.label, settings.runs.len());
+        for settings in experiment.settings() {
+            show_line!("  {:<40} {:>4} runs", settings.label, settings.number);
         }
     }
     let is_planned = |of: &str| plan.experiments.iter().any(|e| e.name == of);
@@ -410,16 +413,16 @@ fn print_plan(plan: &Plan, suite: &Suite, searches: &[Resilience]) {
             );
         }
     }
-    let runs = plan.runs();
-    let robot_steps: f64 = runs
-        .iter()
-        .map(|run| {
-            run.settings.robot_steps_per_generation() as f64 * f64::from(run.settings.generations)
+    let robot_steps: f64 = plan
+        .by_settings()
+        .map(|(settings, runs)| {
+            let generations = f64::from(settings.generations) * f64::from(runs);
+            settings.robot_steps_per_generation() as f64 * generations
         })
         .sum();
     show_line!(
         "\n{} different runs, {} robot-steps",
-        runs.len(),
+        plan.runs().number(),
         in_words(robot_steps)
     );
 }
@@ -436,28 +439,31 @@ fn in_words(number: f64) -> String {
 fn print_status(plan: &Plan, directory: &Path) -> Result<(), RunDirError> {
     for experiment in &plan.experiments {
         show_line!("{}", experiment.name);
-        for settings in &experiment.settings {
-            let of = |state| {
-                let runs = settings.runs.iter();
-                runs.filter(|run| progress(run, directory).is_ok_and(|found| found == state))
-                    .count()
-            };
-            let (done, begun) = (of(Progress::Done), of(Progress::Begun));
+        for settings in experiment.settings() {
+            let (mut done, mut begun) = (0, 0);
+            for run in settings.runs() {
+                match progress(&run, directory) {
+                    Ok(Progress::Done) => done += 1,
+                    Ok(Progress::Begun) => begun += 1,
+                    Ok(Progress::Pending) | Err(_) => {}
+                }
+            }
             show_line!(
                 "  {:<40} {done:>4} of {} done, {begun} begun",
                 settings.label,
-                settings.runs.len()
+                settings.number
             );
         }
     }
     let runs = plan.runs();
-    let is_done = |run: &&&PlannedRun| matches!(progress(run, directory), Ok(Progress::Done));
-    let done = runs.iter().filter(is_done).count();
-    show_line!("\n{done} of {} different runs done", runs.len());
+    let is_done = |run: &PlannedRun| matches!(progress(run, directory), Ok(Progress::Done));
+    let done = runs.iter().filter(is_done).count() as u64;
+    show_line!("\n{done} of {} different runs done", runs.number());
     // An error if there is a damaged one.
-    let hashes = hashes(&runs, directory)?;
-    if done == runs.len() {
-        show_line!("hash {}", hash_of(&hashes));
+    let mut hash = Sha256::new();
+    each_hash(runs, directory, |line| hash.update(line))?;
+    if done == runs.number() {
+        show_line!("hash {}", in_hexadecimal(hash));
     }
     Ok(())
 }
@@ -553,7 +559,7 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     let stop = stop_on_signal()?;
     let pool = thread_pool(threads)?;
     let worked = loop {
-        let worked = pool.install(|| do_all(plan, &runs, directory, manner.progress, stop))?;
+        let worked = pool.install(|| do_all(plan, runs, directory, manner.progress, stop))?;
         match worked {
             Some(1..) if stop.load(Ordering::Relaxed) => break None,
             Some(1..) if work.share != Share::Whole => std::thread::sleep(LOOK_AGAIN),
@@ -569,18 +575,23 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     let Some(elsewhere) = worked else {
         return stopped("the same command");
     };
-    let done = finished(&runs, directory).map_err(BadInput::new)?.len();
-    let mut hash = None;
-    if done == runs.len() {
-        let hashes = hashes(&runs, directory)?;
+    let mut hash = Sha256::new();
+    let mut hashes = Vec::new();
+    let mut done = 0;
+    each_hash(runs, directory, |line| {
+        hash.update(line);
         // A part's would take the place of the whole's.
         if work.choice.is_whole() {
-            let file = directory.join(shard.hashes_file());
-            files::replace(&file, hashes.as_bytes())?;
+            hashes.extend(line.as_bytes());
         }
-        // A share's would be one that no other number of shares gives.
-        hash = (shard == Shard::ALL).then(|| hash_of(&hashes));
+        done += 1;
+    })?;
+    let all_done = done == runs.number();
+    if all_done && work.choice.is_whole() {
+        files::replace(&directory.join(shard.hashes_file()), &hashes)?;
     }
+    // A share's would be one that no other number of shares gives.
+    let hash = (all_done && shard == Shard::ALL).then(|| in_hexadecimal(hash));
     let search_by = match work.share {
         Share::Whole => None,
         Share::One(_) => search_by(work),
@@ -591,7 +602,7 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
             serde_json::json!({
                 "event": "done",
                 "runs_done": done,
-                "runs": runs.len(),
+                "runs": runs.number(),
                 "hash": hash,
                 "search_by": search_by,
             })
@@ -603,7 +614,7 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
         };
         show_line!(
             "{done} of {} runs done in {}{others}",
-            runs.len(),
+            runs.number(),
             directory.display()
         );
         if let Some(hash) = hash {
@@ -637,26 +648,27 @@ fn search_by(work: &Work) -> Option<String> {
 /// Does what is not done; the number of runs that others hold comes back, nothing if interrupted.
 fn do_all(
     plan: &Plan,
-    runs: &[&PlannedRun],
+    runs: Runs<'_>,
     directory: &Path,
     mode: ProgressMode,
     stop: &AtomicBool,
 ) -> anyhow::Result<Option<usize>> {
-    let mut waiting = Vec::new();
-    for &run in runs {
-        if progress(run, directory).map_err(BadInput::new)? != Progress::Done {
-            waiting.push(run);
-        }
+    let mut waiting = 0;
+    for run in runs.iter() {
+        waiting += u64::from(progress(&run, directory).map_err(BadInput::new)? != Progress::Done);
     }
-    let shown = SuiteProgress::start(mode, plan, runs, waiting.len());
+    let shown = SuiteProgress::start(mode, plan, runs, waiting);
     let mut elsewhere = 0;
-    for run in waiting {
-        shown.begins(run);
-        let worked = work_on(run, directory, stop, |generation| {
-            shown.generation(run, generation);
+    for run in runs.iter() {
+        if progress(&run, directory).map_err(BadInput::new)? == Progress::Done {
+            continue;
+        }
+        shown.begins(&run);
+        let worked = work_on(&run, directory, stop, |generation| {
+            shown.generation(&run, generation);
         });
         match worked {
-            Ok(Worked::Completed) => shown.completed(run),
+            Ok(Worked::Completed) => shown.completed(&run),
             Ok(Worked::Elsewhere) => elsewhere += 1,
             Ok(Worked::Interrupted) => {
                 shown.end();
@@ -700,24 +712,27 @@ fn search(
     Ok(ended)
 }
 
-/// A line a run that is done: its name and its hash.
-fn hashes(runs: &[&PlannedRun], directory: &Path) -> Result<String, RunDirError> {
-    let mut text = String::new();
-    for run in runs {
-        if progress(run, directory)? != Progress::Done {
+/// The lines of `hashes.txt`, one a run that is done: its name and its hash. The SHA-256 of all
+/// lines is the hash of the suite.
+fn each_hash(
+    runs: Runs<'_>,
+    directory: &Path,
+    mut take: impl FnMut(&str),
+) -> Result<(), RunDirError> {
+    for run in runs.iter() {
+        if progress(&run, directory)? != Progress::Done {
             continue;
         }
         // Opened, not only read: what a process left that was killed at the very end goes.
         if let Found::Finished(hash) = RunDir::open(&run.directory(directory))? {
-            text += &format!("{} {hash}\n", run.id);
+            take(&format!("{} {hash}\n", run.id));
         }
     }
-    Ok(text)
+    Ok(())
 }
 
-/// One hash for all runs: the SHA-256 of their hashes as they are in `hashes.txt`.
-fn hash_of(hashes: &str) -> String {
-    let hash = Sha256::digest(hashes.as_bytes());
+fn in_hexadecimal(hash: Sha256) -> String {
+    let hash = hash.finalize();
     hash.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

@@ -2,63 +2,48 @@
 
 use super::progress::{ProgressMode, Shown, seconds};
 use crate::output::for_stderr;
-use crate::suite::plan::{Plan, PlannedRun, label};
+use crate::suite::plan::{Plan, PlannedRun, Runs, label};
 use indicatif::ProgressBar;
 use std::cell::Cell;
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// Shows the progress of the runs of one process.
 #[derive(Debug)]
-pub struct SuiteProgress {
+pub struct SuiteProgress<'a> {
     shown: Shown,
     started: Instant,
-    /// Label of each run: its place in the experiment, its settings and seed.
-    labels: BTreeMap<String, String>,
-    runs: usize,
-    done_before: usize,
+    plan: &'a Plan,
+    runs: u64,
+    done_before: u64,
     /// Runs completed, and robot-steps worked and to be worked, by this process.
-    completed: Cell<usize>,
+    completed: Cell<u64>,
     worked: Cell<u64>,
     to_work: u64,
 }
 
-impl SuiteProgress {
+impl<'a> SuiteProgress<'a> {
     /// Starts the clock: of these runs, so many are not done.
     #[must_use]
-    pub fn start(mode: ProgressMode, plan: &Plan, runs: &[&PlannedRun], waiting: usize) -> Self {
-        let mut labels = BTreeMap::new();
-        for experiment in &plan.experiments {
-            let settings = experiment.settings.iter();
-            let all = settings.flat_map(|s| s.runs.iter().map(move |run| (s, run)));
-            let total = all.clone().count();
-            for ((settings, run), place) in all.zip(1..) {
-                let label = format!(
-                    "{} {place}/{total}: {}, seed {}",
-                    experiment.name, settings.label, run.seed
-                );
-                labels.entry(run.id.clone()).or_insert(label);
-            }
-        }
-        let done = (runs.len() - waiting) as u64;
-        let bar = || ProgressBar::new(runs.len() as u64).with_position(done);
-        let steps_of_a_run = runs.first().map_or(0, |run| robot_steps(run));
+    pub fn start(mode: ProgressMode, plan: &'a Plan, runs: Runs<'_>, waiting: u64) -> Self {
+        let number = runs.number();
+        let bar = || ProgressBar::new(number).with_position(number - waiting);
+        let steps_of_a_run = runs.iter().next().map_or(0, |run| robot_steps(&run));
         Self {
             shown: Shown::new(mode, "{pos}/{len} runs", bar),
             started: Instant::now(),
-            labels,
-            runs: runs.len(),
-            done_before: runs.len() - waiting,
+            plan,
+            runs: number,
+            done_before: number - waiting,
             completed: Cell::new(0),
             worked: Cell::new(0),
-            to_work: steps_of_a_run * waiting as u64,
+            to_work: steps_of_a_run.saturating_mul(waiting),
         }
     }
 
     /// A run begins, or is gone on with.
     pub fn begins(&self, run: &PlannedRun) {
         if let Shown::Bar(bar) = &self.shown {
-            bar.set_message(for_stderr(self.label(run)).into_owned());
+            bar.set_message(for_stderr(&self.label(run)).into_owned());
         }
     }
 
@@ -69,7 +54,7 @@ impl SuiteProgress {
         match &self.shown {
             Shown::Bar(bar) => bar.set_message(format!(
                 "{}  generation {generation}/{}  {} left",
-                for_stderr(self.label(run)),
+                for_stderr(&self.label(run)),
                 run.settings.generations,
                 seconds(self.left())
             )),
@@ -92,7 +77,7 @@ impl SuiteProgress {
         self.completed.set(self.completed.get() + 1);
         let done = self.done_before + self.completed.get();
         match &self.shown {
-            Shown::Bar(bar) => bar.set_position(done as u64),
+            Shown::Bar(bar) => bar.set_position(done),
             Shown::Lines => tell!(
                 "{done}/{} runs  {}  {} left",
                 self.runs,
@@ -121,8 +106,8 @@ impl SuiteProgress {
         }
     }
 
-    fn label(&self, run: &PlannedRun) -> &str {
-        self.labels.get(&run.id).map_or("", String::as_str)
+    fn label(&self, run: &PlannedRun) -> String {
+        self.plan.title(run)
     }
 
     fn left(&self) -> Duration {
@@ -185,5 +170,8 @@ impl SearchProgress {
 }
 
 fn robot_steps(run: &PlannedRun) -> u64 {
-    run.settings.robot_steps_per_generation() * u64::from(run.settings.generations)
+    let generations = u64::from(run.settings.generations);
+    run.settings
+        .robot_steps_per_generation()
+        .saturating_mul(generations)
 }

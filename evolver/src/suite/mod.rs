@@ -169,6 +169,21 @@ fn check_of(of: &str, names: &[&str]) -> Result<(), String> {
     Err(format!("of = {of:?}: experiments are {}", names.join(", ")))
 }
 
+/// Most combinations of settings of a suite; of each, there may be many runs.
+const COMBINATIONS_MAX: u64 = 1_000_000;
+
+/// Adds an experiment's combinations to those before it.
+fn check_combinations(experiment: &Experiment, sum: &mut u64) -> Result<(), String> {
+    *sum = sum.saturating_add(experiment.combinations());
+    if *sum <= COMBINATIONS_MAX {
+        return Ok(());
+    }
+    Err(format!(
+        "sensor-models, predictions, grids, robots and noise make {sum} combinations with those of \
+         the experiments before; expected at most {COMBINATIONS_MAX} in a suite"
+    ))
+}
+
 /// Seeds after the first one have to be there.
 fn check_seeds(first_seed: u64, runs: u32) -> Result<(), String> {
     match first_seed.checked_add(u64::from(runs)) {
@@ -181,7 +196,20 @@ fn check_seeds(first_seed: u64, runs: u32) -> Result<(), String> {
 }
 
 impl Experiment {
-    fn check(&self) -> Result<(), String> {
+    /// Number of combinations of the listed values.
+    fn combinations(&self) -> u64 {
+        [
+            self.sensor_models.len(),
+            self.predictions.len(),
+            self.grids.len(),
+            self.robots.len(),
+            self.noise.len(),
+        ]
+        .into_iter()
+        .fold(1, |product, values| product.saturating_mul(values as u64))
+    }
+
+    fn check(&self, combinations: &mut u64) -> Result<(), String> {
         check_count("runs", self.runs)?;
         check_list("grids", &self.grids)?;
         check_list("robots", &self.robots)?;
@@ -189,8 +217,9 @@ impl Experiment {
         check_list("noise", &self.noise)?;
         check_list("predictions", &self.predictions)?;
         check_seeds(self.first_seed, self.runs)?;
-        let settings = plan::settings_of(self);
-        settings.map(|_| ()).map_err(|error| error.to_string())
+        check_combinations(self, combinations)?;
+        let mut settings = plan::settings_of(self);
+        settings.try_for_each(|settings| settings.map(|_| ()).map_err(|error| error.to_string()))
     }
 }
 
@@ -324,11 +353,12 @@ impl Suite {
                 path: path.to_owned(),
             });
         }
+        let mut combinations = 0;
         for (index, experiment) in suite.experiments.iter().enumerate() {
             let problem = if names[..index].contains(&experiment.name.as_str()) {
                 Err("two experiments have this name".to_owned())
             } else {
-                experiment.check()
+                experiment.check(&mut combinations)
             };
             problem.map_err(|problem| invalid(&experiment.name, problem))?;
         }
@@ -354,11 +384,7 @@ mod tests {
         let plan = plan::Plan::new(&suite, None, None, true).unwrap();
         let runs = |name: &str| {
             let experiment = plan.experiments.iter().find(|e| e.name == name).unwrap();
-            experiment
-                .settings
-                .iter()
-                .map(|s| s.runs.len())
-                .sum::<usize>()
+            experiment.settings().map(|s| s.number).sum::<u32>()
         };
         let names = [
             "sensor-models",

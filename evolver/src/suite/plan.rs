@@ -3,93 +3,173 @@
 //! A run's name is a hash of everything that its result depends on: the kernel, the version of
 //! what is computed with it, and the resolved settings with the seed. So finished work is found
 //! again and never mixed up, and experiments that ask for the same run share it.
+//!
+//! A plan holds no run. It knows which settings come in which order, and which seeds of theirs no
+//! earlier settings have; runs are made one by one as they are asked for, so that a plan of a
+//! million runs, or a share of it, takes no more memory than one of ten.
 
-use super::{Experiment, Suite, check_seeds};
+use super::{Experiment, Suite, check_combinations, check_seeds};
 use crate::settings::{Given, SettingError, Settings};
 use minimal_surprise_controller::KERNEL_ID;
-use serde::Serialize;
 use sha2::{Digest, Sha256};
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Version of what a run computes from its settings; changes with every change of results.
 const RESULTS_VERSION: &str = "1";
 
 /// The runs of a suite.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Plan {
     /// Name of the suite.
     pub suite: String,
     /// Its experiments.
     pub experiments: Vec<PlannedExperiment>,
+    /// Every run once, in order.
+    different: Vec<SeedRange>,
+}
+
+/// Runs under the same settings, with seeds that follow each other.
+#[derive(Clone, Copy, Debug)]
+struct SeedRange {
+    experiment: u32,
+    /// Which of the experiment's settings.
+    combination: u32,
+    /// The first run, counted from the experiment's first seed.
+    first: u32,
+    runs: u32,
 }
 
 /// The runs of an experiment.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct PlannedExperiment {
     /// Its name.
     pub name: String,
-    /// Every combination of its settings.
-    pub settings: Vec<PlannedSettings>,
+    /// Its place in the plan.
+    index: usize,
+    /// What is planned, with the number of runs asked for.
+    asked: Experiment,
 }
 
 /// The runs under the same settings.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct PlannedSettings {
     /// What distinguishes them: model, predictions, grid, swarm size, noise.
     pub label: String,
-    /// The runs.
-    pub runs: Vec<PlannedRun>,
+    /// The settings, with the first seed.
+    pub settings: Settings,
+    /// Number of runs.
+    pub number: u32,
+    experiment: usize,
+    combination: u64,
 }
 
 /// One run.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct PlannedRun {
     /// Its name, and that of its directory.
     pub id: String,
     /// Its seed.
     pub seed: u64,
     /// Everything else.
-    #[serde(skip)]
     pub settings: Settings,
+    /// The first experiment that has it.
+    experiment: usize,
+    /// Its place in that experiment, from 1.
+    place: u64,
+}
+
+/// Some runs of a plan, each once: all, or every n-th.
+#[derive(Clone, Copy, Debug)]
+pub struct Runs<'a> {
+    plan: &'a Plan,
+    first: u64,
+    step: u64,
 }
 
 impl PlannedExperiment {
+    /// Every combination of its settings.
+    pub fn settings(&self) -> impl Iterator<Item = PlannedSettings> {
+        (0..self.asked.combinations()).map(|combination| self.combination(combination))
+    }
+
+    /// # Panics
+    /// If there are not so many. All settings were checked when the plan was made.
+    fn combination(&self, combination: u64) -> PlannedSettings {
+        let settings = combination_of(&self.asked, combination).expect("settings were checked");
+        PlannedSettings {
+            label: label(&settings),
+            settings,
+            number: self.asked.runs,
+            experiment: self.index,
+            combination,
+        }
+    }
+
     /// The runs after the planned ones: of all settings in turn, with the seeds that follow.
     pub fn further(&self) -> impl Iterator<Item = PlannedRun> {
-        let rounds = if self.settings.is_empty() {
-            0
-        } else {
-            u32::MAX
-        };
-        (0..rounds).flat_map(|round| {
-            let settings = self.settings.iter();
-            settings.filter_map(move |settings| {
-                let last = settings.runs.last()?;
-                let seed = last.seed.checked_add(1)?.checked_add(round.into())?;
-                Some(PlannedRun::new(&last.settings, seed))
-            })
+        (0..u64::from(u32::MAX)).flat_map(|round| {
+            self.settings()
+                .filter_map(move |settings| settings.run(u64::from(settings.number) + round))
+        })
+    }
+}
+
+impl PlannedSettings {
+    /// The runs, by seed.
+    pub fn runs(&self) -> impl Iterator<Item = PlannedRun> {
+        (0..u64::from(self.number)).filter_map(|number| self.run(number))
+    }
+
+    /// A run, planned or beyond the plan; none if there is no such seed.
+    fn run(&self, number: u64) -> Option<PlannedRun> {
+        let seed = self.settings.seed.checked_add(number)?;
+        let mut settings = self.settings.clone();
+        settings.seed = seed;
+        settings.written.seed = seed;
+        Some(PlannedRun {
+            id: hex(id(&settings)),
+            seed,
+            settings,
+            experiment: self.experiment,
+            place: self.combination * u64::from(self.number) + number + 1,
         })
     }
 }
 
 impl PlannedRun {
-    /// The run of some settings with another seed.
-    fn new(settings: &Settings, seed: u64) -> Self {
-        let mut settings = settings.clone();
-        settings.seed = seed;
-        settings.written.seed = seed;
-        Self {
-            id: id(&settings),
-            seed,
-            settings,
-        }
-    }
-
     /// Its directory below that of the suite.
     #[must_use]
     pub fn directory(&self, suite: &Path) -> PathBuf {
         suite.join("runs").join(&self.id)
+    }
+}
+
+impl<'a> Runs<'a> {
+    /// How many there are.
+    #[must_use]
+    pub fn number(self) -> u64 {
+        let all: u64 = self.plan.different.iter().map(|r| u64::from(r.runs)).sum();
+        all.saturating_sub(self.first).div_ceil(self.step)
+    }
+
+    /// The runs, in order.
+    pub fn iter(self) -> impl Iterator<Item = PlannedRun> + 'a {
+        let Self { plan, first, step } = self;
+        let mut skipped = first;
+        plan.different.iter().flat_map(move |range| {
+            let runs = u64::from(range.runs);
+            let start = skipped.min(runs);
+            let taken = (runs - start).div_ceil(step);
+            skipped = skipped + taken * step - runs;
+            let experiment = &plan.experiments[range.experiment as usize];
+            let settings = (taken > 0).then(|| experiment.combination(range.combination.into()));
+            let first = u64::from(range.first) + start;
+            settings.into_iter().flat_map(move |settings| {
+                (0..taken).filter_map(move |n| settings.run(first + n * step))
+            })
+        })
     }
 }
 
@@ -104,9 +184,9 @@ pub enum PlanError {
         /// The names there are.
         names: Vec<String>,
     },
-    /// There are not so many seeds.
+    /// There are not so many seeds, or too many combinations.
     #[error("experiment {experiment:?}: {problem}")]
-    Seeds {
+    Experiment {
         /// The experiment.
         experiment: String,
         /// What is wrong and what would be valid.
@@ -141,55 +221,143 @@ impl Plan {
             Some(name) => experiment.name == name,
             None => with_optional || !experiment.optional,
         };
-        let experiments = suite.experiments.iter().filter(wanted).map(|experiment| {
-            let runs_of_each = runs.unwrap_or(experiment.runs);
-            check_seeds(experiment.first_seed, runs_of_each).map_err(|problem| {
-                PlanError::Seeds {
-                    experiment: experiment.name.clone(),
-                    problem,
-                }
-            })?;
-            Ok(PlannedExperiment {
+        let mut experiments = Vec::new();
+        for (index, experiment) in suite.experiments.iter().filter(wanted).enumerate() {
+            let asked = Experiment {
+                runs: runs.unwrap_or(experiment.runs),
+                ..experiment.clone()
+            };
+            experiments.push(PlannedExperiment {
                 name: experiment.name.clone(),
-                settings: settings_of(experiment)?
-                    .into_iter()
-                    .map(|settings| planned(&settings, experiment.first_seed, runs_of_each))
-                    .collect(),
-            })
-        });
+                index,
+                asked,
+            });
+        }
+        let about = |experiment: &PlannedExperiment| {
+            let experiment = experiment.name.clone();
+            move |problem| PlanError::Experiment {
+                experiment,
+                problem,
+            }
+        };
+        let mut combinations = 0;
+        for experiment in &experiments {
+            let asked = &experiment.asked;
+            check_seeds(asked.first_seed, asked.runs).map_err(about(experiment))?;
+            check_combinations(asked, &mut combinations).map_err(about(experiment))?;
+        }
         Ok(Self {
             suite: suite.name.clone(),
-            experiments: experiments.collect::<Result<_, PlanError>>()?,
+            different: different(&experiments)?,
+            experiments,
         })
     }
 
     /// Every run once, in order.
     #[must_use]
-    pub fn runs(&self) -> Vec<&PlannedRun> {
-        let mut seen = BTreeSet::new();
-        self.experiments
-            .iter()
-            .flat_map(|experiment| &experiment.settings)
-            .flat_map(|settings| &settings.runs)
-            .filter(|run| seen.insert(run.id.clone()))
-            .collect()
+    pub fn runs(&self) -> Runs<'_> {
+        self.share(0, 1)
+    }
+
+    /// Every `of`-th run, from the one with this index on.
+    #[must_use]
+    pub fn share(&self, index: u32, of: u32) -> Runs<'_> {
+        Runs {
+            plan: self,
+            first: index.into(),
+            step: u64::from(of).max(1),
+        }
+    }
+
+    /// The different runs by their settings, with their number.
+    pub fn by_settings(&self) -> impl Iterator<Item = (Settings, u32)> {
+        self.different.iter().map(|range| {
+            let experiment = &self.experiments[range.experiment as usize];
+            let planned = experiment.combination(range.combination.into());
+            (planned.settings, range.runs)
+        })
+    }
+
+    /// A run for people: its place in its experiment, its settings and seed.
+    #[must_use]
+    pub fn title(&self, run: &PlannedRun) -> String {
+        let PlannedExperiment { name, asked, .. } = &self.experiments[run.experiment];
+        let total = asked.combinations() * u64::from(asked.runs);
+        let (place, label, seed) = (run.place, label(&run.settings), run.seed);
+        format!("{name} {place}/{total}: {label}, seed {seed}")
     }
 }
 
-fn planned(settings: &Settings, first_seed: u64, runs: u32) -> PlannedSettings {
-    let runs = (0..runs).map(|run| PlannedRun::new(settings, first_seed + u64::from(run)));
-    PlannedSettings {
-        label: label(settings),
-        runs: runs.collect(),
+/// The runs of all experiments in order, less those that came before.
+fn different(experiments: &[PlannedExperiment]) -> Result<Vec<SeedRange>, SettingError> {
+    let mut ranges = Vec::new();
+    let mut names = Vec::new();
+    for experiment in experiments {
+        for combination in 0..experiment.asked.combinations() {
+            let mut settings = combination_of(&experiment.asked, combination)?;
+            // What the settings are without their seed.
+            settings.written.seed = 0;
+            names.push((id(&settings), ranges.len()));
+            ranges.push(SeedRange {
+                experiment: experiment.index as u32,
+                combination: combination as u32,
+                first: 0,
+                runs: experiment.asked.runs,
+            });
+        }
     }
+    names.sort_unstable();
+    // Ranges whose settings came before, with what they still add.
+    let mut cut: BTreeMap<usize, Vec<SeedRange>> = BTreeMap::new();
+    for same in names.chunk_by(|one, next| one.0 == next.0) {
+        let mut before: Vec<Range<u64>> = Vec::new();
+        for &(_, place) in same.iter().filter(|_| same.len() > 1) {
+            let range = ranges[place];
+            let first_seed = experiments[range.experiment as usize].asked.first_seed;
+            let seeds = first_seed..first_seed + u64::from(range.runs);
+            let new = without(seeds.clone(), &before).into_iter();
+            let new = new.map(|new| SeedRange {
+                first: (new.start - first_seed) as u32,
+                runs: (new.end - new.start) as u32,
+                ..range
+            });
+            cut.insert(place, new.collect());
+            before.push(seeds);
+        }
+    }
+    if cut.is_empty() {
+        return Ok(ranges);
+    }
+    let all = ranges.iter().enumerate();
+    let left = all.flat_map(|(place, range)| cut.remove(&place).unwrap_or_else(|| vec![*range]));
+    Ok(left.collect())
+}
+
+/// What is left of some seeds without those of other ranges, in order.
+fn without(seeds: Range<u64>, others: &[Range<u64>]) -> Vec<Range<u64>> {
+    others.iter().fold(vec![seeds], |left, other| {
+        left.into_iter()
+            .flat_map(|part| {
+                [
+                    part.start..part.end.min(other.start),
+                    part.start.max(other.end)..part.end,
+                ]
+            })
+            .filter(|part| !part.is_empty())
+            .collect()
+    })
 }
 
 /// The name of a run.
-fn id(settings: &Settings) -> String {
+fn id(settings: &Settings) -> [u8; 8] {
     let written = toml::to_string(&settings.written).expect("plain numbers and strings");
     let text = format!("{KERNEL_ID}\n{RESULTS_VERSION}\n{written}");
     let hash = Sha256::digest(text.as_bytes());
-    hash[..8].iter().map(|byte| format!("{byte:02x}")).collect()
+    *hash.first_chunk().expect("a hash has 32 bytes")
+}
+
+fn hex(id: [u8; 8]) -> String {
+    id.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// What distinguishes settings, in words.
@@ -213,42 +381,148 @@ pub fn label(settings: &Settings) -> String {
 }
 
 /// Every combination of an experiment's settings, with its first seed.
-///
-/// # Errors
-/// [`SettingError`] names the value and what would be valid.
-pub fn settings_of(experiment: &Experiment) -> Result<Vec<Settings>, SettingError> {
-    let mut all = Vec::new();
-    for model in &experiment.sensor_models {
-        for prediction in &experiment.predictions {
-            for grid in &experiment.grids {
-                for robots in &experiment.robots {
-                    for noise in &experiment.noise {
-                        let mut given = Given::default();
-                        given.flag("sensor-model", Some(model));
-                        match prediction.strip_prefix("partly-") {
-                            Some(template) => given.flag("predefine-partly", Some(template)),
-                            None if prediction == "free" => {}
-                            None => given.flag("predefine", Some(prediction)),
-                        }
-                        given.flag("grid", Some(grid));
-                        given.flag("robots", Some(&robots.to_string()));
-                        given.flag("noise", Some(&noise.to_string()));
-                        let numbers = [
-                            ("population", experiment.population),
-                            ("generations", experiment.generations),
-                            ("repetitions", experiment.repetitions),
-                            ("steps", experiment.steps),
-                        ];
-                        for (key, number) in numbers {
-                            given.flag(key, number.map(|n| n.to_string()).as_deref());
-                        }
-                        let mutation = experiment.mutation.map(|rate| rate.to_string());
-                        given.flag("mutation", mutation.as_deref());
-                        all.push(Settings::resolve(&given, || experiment.first_seed)?);
-                    }
+pub fn settings_of(
+    experiment: &Experiment,
+) -> impl Iterator<Item = Result<Settings, SettingError>> {
+    (0..experiment.combinations()).map(|combination| combination_of(experiment, combination))
+}
+
+/// The settings of one combination: noise varies fastest, then robots, grids, predictions, models.
+fn combination_of(experiment: &Experiment, combination: u64) -> Result<Settings, SettingError> {
+    let mut rest = combination;
+    let mut next = |values: usize| {
+        let index = rest % values as u64;
+        rest /= values as u64;
+        index as usize
+    };
+    let noise = experiment.noise[next(experiment.noise.len())];
+    let robots = experiment.robots[next(experiment.robots.len())];
+    let grid = &experiment.grids[next(experiment.grids.len())];
+    let prediction = &experiment.predictions[next(experiment.predictions.len())];
+    let model = &experiment.sensor_models[next(experiment.sensor_models.len())];
+    let mut given = Given::default();
+    given.flag("sensor-model", Some(model));
+    match prediction.strip_prefix("partly-") {
+        Some(template) => given.flag("predefine-partly", Some(template)),
+        None if prediction == "free" => {}
+        None => given.flag("predefine", Some(prediction)),
+    }
+    given.flag("grid", Some(grid));
+    given.flag("robots", Some(&robots.to_string()));
+    given.flag("noise", Some(&noise.to_string()));
+    let numbers = [
+        ("population", experiment.population),
+        ("generations", experiment.generations),
+        ("repetitions", experiment.repetitions),
+        ("steps", experiment.steps),
+    ];
+    for (key, number) in numbers {
+        given.flag(key, number.map(|n| n.to_string()).as_deref());
+    }
+    let mutation = experiment.mutation.map(|rate| rate.to_string());
+    given.flag("mutation", mutation.as_deref());
+    Settings::resolve(&given, || experiment.first_seed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    const OVERLAPS: &str = "
+        name = \"own\"
+        [[experiment]]
+        name = \"one\"
+        runs = 3
+        first-seed = 5
+        grids = [\"8x8\", \"9x9\"]
+        robots = [20]
+        [[experiment]]
+        name = \"two\"
+        runs = 9
+        first-seed = 2
+        grids = [\"9x9\", \"10x9\", \"9x9\"]
+        robots = [20, 30]
+        [[experiment]]
+        name = \"three\"
+        runs = 4
+        grids = [\"8x8\", \"9x9\"]
+        robots = [30, 20]
+    ";
+
+    fn plan() -> Plan {
+        let suite = Suite::parse(Path::new("own.toml"), OVERLAPS).unwrap();
+        Plan::new(&suite, None, None, false).unwrap()
+    }
+
+    #[test]
+    fn runs_come_once_in_the_order_in_which_experiments_first_ask_for_them() {
+        let plan = plan();
+        let mut seen = BTreeSet::new();
+        let mut expected: Vec<(String, String)> = Vec::new();
+        for experiment in &plan.experiments {
+            for run in experiment
+                .settings()
+                .collect::<Vec<_>>()
+                .iter()
+                .flat_map(PlannedSettings::runs)
+            {
+                if seen.insert(run.id.clone()) {
+                    expected.push((run.id.clone(), plan.title(&run)));
                 }
             }
         }
+        let found: Vec<_> = plan
+            .runs()
+            .iter()
+            .map(|run| (run.id.clone(), plan.title(&run)))
+            .collect();
+        assert_eq!(found, expected);
+        assert_eq!(plan.runs().number(), expected.len() as u64);
+        let by_settings = plan.by_settings().map(|(_, runs)| u64::from(runs));
+        assert_eq!(by_settings.sum::<u64>(), expected.len() as u64);
+        assert!(expected.len() < 3 * 2 + 9 * 6 + 4 * 4, "some are shared");
     }
-    Ok(all)
+
+    #[test]
+    fn shares_of_any_number_have_every_run_once_and_know_their_size() {
+        let plan = plan();
+        let all: Vec<String> = plan.runs().iter().map(|run| run.id).collect();
+        for of in [1, 2, 3, 7, 20, 100] {
+            for index in 0..of {
+                let share = plan.share(index, of);
+                let found: Vec<String> = share.iter().map(|run| run.id).collect();
+                let expected = all.iter().skip(index as usize).step_by(of as usize);
+                assert!(found.iter().eq(expected), "{index} of {of}");
+                assert_eq!(share.number(), found.len() as u64, "{index} of {of}");
+            }
+        }
+    }
+
+    #[test]
+    fn seeds_without_others_are_what_is_left_of_them() {
+        let others = [3..5, 4..6, 8..9, 20..30];
+        assert_eq!(without(0..10, &others), [0..3, 6..8, 9..10]);
+        assert_eq!(without(3..6, &others), []);
+    }
+
+    #[test]
+    fn a_suite_of_more_combinations_than_can_be_held_is_refused_before_any_is_made() {
+        let numbers = |count: u32| {
+            (1..=count)
+                .map(|n| n.to_string())
+                .collect::<Vec<_>>()
+                .join(",")
+        };
+        let text = format!(
+            "name = \"own\"\n[[experiment]]\nname = \"one\"\nruns = 1\nrobots = [{}]\nnoise = [{}]\n",
+            numbers(225),
+            "0.1,".repeat(5000)
+        );
+        let error = Suite::parse(Path::new("own.toml"), &text)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("1125000 combinations"), "{error}");
+        assert!(error.contains("at most 1000000"), "{error}");
+    }
 }

@@ -44,12 +44,13 @@ pub fn look(
         return Ok(Search::NotNeeded);
     };
     let mut waits = false;
-    let planned = experiment.settings.iter().flat_map(|s| &s.runs);
-    for run in planned.filter(|_| after == 0) {
-        match has(run, structure, suite)? {
-            Some(true) => return Ok(Search::NotNeeded),
-            Some(false) => {}
-            None => waits = true,
+    for settings in experiment.settings().filter(|_| after == 0) {
+        for run in settings.runs() {
+            match has(&run, structure, suite)? {
+                Some(true) => return Ok(Search::NotNeeded),
+                Some(false) => {}
+                None => waits = true,
+            }
         }
     }
     if waits {
@@ -127,9 +128,9 @@ mod tests {
         let (_, plan) = suite("line", 1);
         // What there is to find: the first run beyond the plan with something new in its name.
         let mut known = BTreeSet::new();
-        for run in plan.runs() {
-            done(run, &everywhere);
-            known.extend(names(run, &everywhere).iter().map(|s| s.name()));
+        for run in plan.runs().iter() {
+            done(&run, &everywhere);
+            known.extend(names(&run, &everywhere).iter().map(|s| s.name()));
         }
         let mut further = (1..).zip(plan.experiments[0].further());
         let (number, wanted, found) = further
@@ -160,9 +161,7 @@ mod tests {
             look(&plan, asked, &directory, 0).unwrap(),
             Search::Waits
         ));
-        plan.runs()
-            .into_iter()
-            .for_each(|run| done(run, &directory));
+        plan.runs().iter().for_each(|run| done(&run, &directory));
         for expected in 1..=number {
             match look(&plan, asked, &directory, expected - 1).unwrap() {
                 Search::Next(run, next) if next == expected => done(&run, &directory),

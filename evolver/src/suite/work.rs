@@ -4,7 +4,7 @@
 //! and what belongs to it.
 //! Any number of processes may work on the same plan; each takes runs that no other holds.
 
-use super::plan::{Plan, PlannedRun};
+use super::plan::{Plan, PlannedRun, Runs};
 use crate::evolving::until_finished;
 use crate::experiment::Experiment;
 use crate::finished_run::{ReadRunError, is_complete};
@@ -51,11 +51,8 @@ impl Shard {
 
     /// The runs of this share.
     #[must_use]
-    pub fn of_plan(self, plan: &Plan) -> Vec<&PlannedRun> {
-        let runs = plan.runs().into_iter().enumerate();
-        runs.filter(|(place, _)| place % self.of as usize == self.index as usize)
-            .map(|(_, run)| run)
-            .collect()
+    pub fn of_plan(self, plan: &Plan) -> Runs<'_> {
+        plan.share(self.index, self.of)
     }
 }
 
@@ -192,7 +189,7 @@ mod tests {
         let file = scratch.join("own.toml");
         fs::write(&file, SUITE).unwrap();
         let plan = Plan::new(&Suite::read(&file).unwrap(), None, None, false).unwrap();
-        plan.runs()[0].clone()
+        plan.runs().iter().next().unwrap()
     }
 
     fn contents(directory: &Path) -> BTreeMap<String, Vec<u8>> {

@@ -286,8 +286,8 @@ impl Gathered {
     pub fn read(plan: &Plan, suite: &Suite, directory: &Path) -> Result<Self, ReportError> {
         let mut groups = Vec::new();
         for experiment in &plan.experiments {
-            for settings in &experiment.settings {
-                groups.extend(read_group(&experiment.name, settings, directory)?);
+            for settings in experiment.settings() {
+                groups.push(read_group(&experiment.name, settings, directory)?);
             }
         }
         let mut reevaluations = Vec::new();
@@ -366,23 +366,20 @@ struct MetaFile {
 
 fn read_group(
     experiment: &str,
-    settings: &PlannedSettings,
+    settings: PlannedSettings,
     directory: &Path,
-) -> Result<Option<Group>, ReportError> {
-    let Some(first) = settings.runs.first() else {
-        return Ok(None);
-    };
+) -> Result<Group, ReportError> {
     let mut runs = Vec::new();
-    for planned in &settings.runs {
-        runs.extend(read_run(planned, &planned.directory(directory))?);
+    for planned in settings.runs() {
+        runs.extend(read_run(&planned, &planned.directory(directory))?);
     }
-    Ok(Some(Group {
+    Ok(Group {
         experiment: experiment.to_owned(),
-        label: settings.label.clone(),
-        settings: first.settings.clone(),
-        planned: settings.runs.len(),
+        label: settings.label,
+        settings: settings.settings,
+        planned: settings.number as usize,
         runs,
-    }))
+    })
 }
 
 /// The first so many runs beyond the plan of an experiment, by settings.

@@ -622,8 +622,8 @@ mod tests {
         let suite = Suite::parse(Path::new("own.toml"), text).unwrap();
         let plan = Plan::new(&suite, None, None, false).unwrap();
         let further: Vec<_> = plan.experiments[0].further().take(2).collect();
-        for run in plan.runs().into_iter().chain(&further) {
-            let worked = work_on(run, scratch.path(), &AtomicBool::new(false), |_| {});
+        for run in plan.runs().iter().chain(further.clone()) {
+            let worked = work_on(&run, scratch.path(), &AtomicBool::new(false), |_| {});
             assert_eq!(worked.unwrap(), Worked::Completed);
         }
         let out = scratch.path().join("report");
@@ -663,7 +663,7 @@ mod tests {
         std::fs::write(&file, OWN).unwrap();
         let suite = Suite::read(&file).unwrap();
         let plan = Plan::new(&suite, None, None, false).unwrap();
-        let runs = plan.runs();
+        let runs: Vec<_> = plan.runs().iter().collect();
         let (last, others) = runs.split_last().unwrap();
         for run in others {
             let worked = work_on(run, &directory, &AtomicBool::new(false), |_| {});
@@ -717,11 +717,10 @@ mod tests {
 
         let numbers = ours(&out, "numbers-two.csv");
         let shares = ours(&out, "structures-two.csv");
-        for settings in &plan.experiments[0].settings {
+        for settings in plan.experiments[0].settings() {
             let setting = format!("two: {}", settings.label);
             let finished: Vec<_> = settings
-                .runs
-                .iter()
+                .runs()
                 .filter_map(|run| FinishedRun::read(&run.directory(&directory)).ok())
                 .collect();
             let fitness: Vec<f64> = finished

@@ -240,7 +240,7 @@ mod tests {
         let values = PaperValues::for_suite("paper");
         let exists = |experiment: &str, setting: &str| {
             let found = plan.experiments.iter().any(|planned| {
-                planned.name == experiment && planned.settings.iter().any(|s| s.label == setting)
+                planned.name == experiment && planned.settings().any(|s| s.label == setting)
             });
             assert!(found, "{experiment}: {setting}");
         };
