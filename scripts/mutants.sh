@@ -19,7 +19,7 @@ while [ "$shard" -lt "$shards" ]; do
     if [ ! -e "$this/complete" ]; then
         mkdir -p "$this"
         status=0
-        nice cargo mutants --package minimal-surprise-controller --package minimal-surprise-slots \
+        cargo mutants --package minimal-surprise-controller --package minimal-surprise-slots \
             --package minimal-surprise-link --shard "$shard/$shards" --sharding round-robin \
             --output "$this" || status=$?
         # 2: mutants have survived. 3: tests have taken too long, which counts as caught.

@@ -13,8 +13,8 @@ use minimal_surprise_controller::{
 };
 use minimal_surprise_link::{
     CHUNK_BYTES_MAX, Client, Decoder, Direction, Envelope, FRAME_BYTES_MAX, Faults, GaveUp,
-    GenomeInUse, Handler, Identity, LineCounters, MalformedMessage, PROTOCOL_VERSION, Refusal,
-    Reply, Report, Request, RequestError, Server, Stepped, WIRE_BYTES_MAX, decode_reply,
+    GenomeInUse, Handler, Identity, LineCounters, LineErrors, MalformedMessage, PROTOCOL_VERSION,
+    Refusal, Reply, Report, Request, RequestError, Server, Stepped, WIRE_BYTES_MAX, decode_reply,
     decode_request, encode,
 };
 use minimal_surprise_slots::{Buffer, InUse, crc_of};
@@ -648,6 +648,120 @@ fn clients_take_only_the_reply_to_their_pending_request() {
 }
 
 #[test]
+fn a_client_starts_with_nothing_to_tell_and_gives_up_nothing() {
+    let mut client = Client::new(7, 1);
+    assert_eq!(client.timed_out(), Err(GaveUp { attempts: 0 }));
+    assert_eq!((client.strays(), client.last_malformed()), (0, None));
+    assert_eq!(client.errors(), LineErrors::default());
+    client.request(&Request::Identify).unwrap();
+    assert_eq!(client.timed_out(), Err(GaveUp { attempts: 1 }));
+}
+
+#[test]
+fn a_client_counts_what_is_no_frame_by_its_kind() {
+    let mut client = Client::new(7, 1);
+    let mut wrong_crc = frame_of(&[PROTOCOL_VERSION, 1]);
+    let last = wrong_crc.len() - 2;
+    wrong_crc[last] ^= 0x40;
+    let too_long = reference_cobs(&[1; FRAME_BYTES_MAX + 1]);
+    // A block that ends before its length, and a frame without a message.
+    let cut_off = vec![0, 5, 1, 0];
+    let empty = reference_cobs(&crc_32c(&[]).to_le_bytes());
+    for (wires, bad_crc, no_frame) in [
+        (vec![wrong_crc.clone(), wrong_crc], 2, 0),
+        (vec![too_long], 2, 1),
+        (vec![cut_off], 2, 2),
+        (vec![empty], 2, 3),
+    ] {
+        for byte in wires.concat() {
+            assert_eq!(client.feed(byte), None);
+        }
+        let expected = LineErrors { bad_crc, no_frame };
+        assert_eq!(client.errors(), expected);
+    }
+    assert_eq!(client.strays(), 0, "none of these was a message");
+}
+
+#[test]
+fn a_decoder_shows_message_and_crc_from_the_last_byte_of_a_frame_to_the_next_byte() {
+    let mut decoder = Decoder::new();
+    let payload = [PROTOCOL_VERSION, 0, 7];
+    let wire = frame_of(&payload);
+    for _ in 0..2 {
+        for (at, &byte) in wire.iter().enumerate() {
+            let complete = decoder.feed(byte);
+            assert_eq!(complete, at == wire.len() - 1);
+            let shown = (decoder.payload(), decoder.crc());
+            match complete {
+                true => assert_eq!(shown, (&payload[..], crc_32c(&payload))),
+                false => assert_eq!(shown, (&[][..], 0), "byte {at}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn every_kind_of_fault_is_a_bit_of_its_own() {
+    let kinds = [
+        Faults::NO_GENOME,
+        Faults::SLOT_DAMAGED,
+        Faults::FLASH,
+        Faults::NEIGHBOURS_STALE,
+        Faults::WATCHDOG,
+    ];
+    assert_eq!(kinds.map(|kind| kind.0), [1, 2, 4, 8, 16]);
+    for (index, &fault) in kinds.iter().enumerate() {
+        assert!(fault.contains(Faults::NONE) && !Faults::NONE.contains(fault));
+        assert_eq!(fault.and(fault), fault);
+        for (other_index, &other) in kinds.iter().enumerate() {
+            assert_eq!(fault.contains(other), index == other_index);
+            let both = fault.and(other);
+            assert!(both.contains(fault) && both.contains(other));
+            assert_eq!(fault.contains(both), index == other_index);
+        }
+    }
+}
+
+#[test]
+fn only_an_erase_takes_more_than_half_a_second() {
+    let begin = Request::Begin { length: 1, crc: 2 };
+    assert_eq!(begin.timeout_ms(), 10_000);
+    for request in [Request::Identify, Request::Commit, Request::Telemetry] {
+        assert_eq!(request.timeout_ms(), 500);
+    }
+}
+
+#[test]
+fn telemetry_counts_its_own_request_and_all_that_came_before() {
+    let (mut server, mut handler) = (Server::new(), Recorder::default());
+    let identify = wire_of(&request(7, 0, Request::Identify));
+    feed(&mut server, &mut handler, &identify);
+    feed(&mut server, &mut handler, &identify);
+    let mut late = wire_of(&request(6, 3, Request::Stop));
+    feed(&mut server, &mut handler, &late);
+    feed(&mut server, &mut handler, &frame_of(b"no message"));
+    let last_of_crc = late.len() - 2;
+    late[last_of_crc] ^= 0x40;
+    feed(&mut server, &mut handler, &late);
+    feed(&mut server, &mut handler, &[0, 9, 0]);
+    let telemetry = wire_of(&request(7, 1, Request::Telemetry));
+    let answer = feed(&mut server, &mut handler, &telemetry).remove(0);
+    let payload = reference_decode(&answer[1..answer.len() - 1]).unwrap();
+    let line = LineCounters {
+        accepted: 2,
+        repeated: 1,
+        stale: 1,
+        malformed: 1,
+        bad_crc: 1,
+        no_frame: 1,
+    };
+    let report = Report::default();
+    let body = Reply::Telemetry { report, line };
+    assert_eq!(decode_reply(&payload).map(|reply| reply.body), Ok(body));
+    assert_eq!(server.counters(), line);
+}
+
+#[test]
 fn the_longest_messages_fit_a_frame() {
     let text = "ä".repeat(40);
     let mut handler = Recorder::default();
@@ -714,8 +828,15 @@ fn the_longest_messages_fit_a_frame() {
     }
     let data = &[1; CHUNK_BYTES_MAX];
     let offset = u16::MAX;
-    let chunk = wire_of(&request(all, all, Request::Chunk { offset, data }));
+    let longest = request(all, all, Request::Chunk { offset, data });
+    let chunk = wire_of(&longest);
     assert_eq!(chunk.len(), WIRE_BYTES_MAX);
+    let payload = reference_decode(&chunk[1..chunk.len() - 1]).unwrap();
+    assert_eq!(decode_request(&payload), Ok(longest));
+    let mut client = Client::new(all, 1);
+    client.request(&Request::Identify).unwrap();
+    assert!(client.timed_out().is_err());
+    assert!(client.request(&Request::Chunk { offset, data }).is_ok());
 }
 
 /// The bytes of a message without CRC and COBS, in hexadecimal.

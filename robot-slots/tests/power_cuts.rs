@@ -10,8 +10,8 @@ use embedded_storage::nor_flash::NorFlash;
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, Provenance, encode};
 use minimal_surprise_controller::{EncodedGenome, Genome, Topology};
 use minimal_surprise_slots::{
-    Buffer, CONTAINER_AT, Defect, InPlace, InUse, PlaceError, SlotState, Slots, UpdateError,
-    crc_of, slot_bytes,
+    Buffer, COMMIT_AT, CONTAINER_AT, Defect, InPlace, InUse, PlaceError, Slot, SlotState, Slots,
+    UpdateError, crc_of, slot_bytes,
 };
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
@@ -371,7 +371,7 @@ fn a_damaged_genome_gives_way_to_the_older_one_and_both_to_the_built_in() {
         let mut slots = Slots::open(&mut flash, Flash::OFFSET, room).unwrap();
         let count = slots.newest().map(|(_, header)| header.write_count);
         assert_eq!(count, left);
-        let faults = minimal_surprise_slots::Slot::ALL
+        let faults = Slot::ALL
             .map(|slot| matches!(slots.state(slot), SlotState::Damaged(_, Defect::Refused(_))));
         assert_eq!(faults, [damaged == 0, true]);
         assert_eq!(slots.in_use(room) == InUse::BuiltIn, left.is_none());
@@ -381,6 +381,64 @@ fn a_damaged_genome_gives_way_to_the_older_one_and_both_to_the_built_in() {
     let genome = container(Topology::default(), 7);
     assert_eq!(slots.write(&genome, room), Ok(3));
     assert_eq!(slots.newest().map(|(slot, _)| slot.index()), Some(0));
+}
+
+#[test]
+fn of_two_damaged_genomes_the_older_one_is_replaced() {
+    type Flash = MockFlash<4, 4096>;
+    let room = &mut Buffer::new();
+    let mut flash = Flash::new();
+    for count in 1..=3 {
+        let mut slots = Slots::open(&mut flash, Flash::OFFSET, room).unwrap();
+        let genome = container(Topology::default(), count);
+        assert_eq!(slots.write(&genome, room), Ok(count));
+    }
+    for slot in Slot::ALL {
+        let slot_at = Flash::OFFSET + u32::from(slot.index()) * slot_bytes(4096) as u32;
+        flash.damage(slot_at + CONTAINER_AT + 99, 0x10);
+    }
+    let mut slots = Slots::open(&mut flash, Flash::OFFSET, room).unwrap();
+    assert_eq!(slots.newest(), None);
+    let genome = container(Topology::default(), 4);
+    assert_eq!(slots.write(&genome, room), Ok(4));
+    assert_eq!(slots.newest().map(|(slot, _)| slot), Some(Slot::Second));
+    assert!(
+        matches!(slots.state(Slot::First), SlotState::Damaged(header, _) if header.write_count == 3)
+    );
+}
+
+#[test]
+fn slots_that_are_empty_interrupted_and_unreadable_are_told_apart() {
+    type Flash = MockFlash<4, 256>;
+    let room = &mut Buffer::new();
+    let states = |flash: &mut Flash| {
+        let slots = Slots::open(flash, Flash::OFFSET, &mut Buffer::new()).unwrap();
+        assert_eq!(slots.newest(), None);
+        Slot::ALL.map(|slot| slots.state(slot))
+    };
+    let mut blank = Flash::new();
+    assert_eq!(states(&mut blank), [SlotState::Empty; 2]);
+
+    let mut begun = blank.clone();
+    let mut slots = Slots::open(&mut begun, Flash::OFFSET, room).unwrap();
+    slots.begin(100, 7).unwrap();
+    let expected = [SlotState::Unfinished, SlotState::Empty];
+    assert_eq!(Slot::ALL.map(|slot| slots.state(slot)), expected);
+    assert_eq!(states(&mut begun), expected);
+
+    // Words of another program, where a header and where a commit record would be.
+    for at in [0, COMMIT_AT] {
+        let mut strange = blank.clone();
+        strange.write(Flash::OFFSET + at, b"ELF!").unwrap();
+        assert_eq!(states(&mut strange), expected, "at {at}");
+    }
+
+    blank.cut_power_after(0, 0);
+    blank.write(0, &[0; 4]).expect_err("power failed");
+    assert_eq!(states(&mut blank), [SlotState::Unreadable; 2]);
+    let mut slots = Slots::open(&mut blank, Flash::OFFSET, room).unwrap();
+    assert_eq!(slots.begin(100, 7), Err(UpdateError::Flash(PowerCut)));
+    assert_eq!(slots.taken(), None);
 }
 
 #[test]
