@@ -75,6 +75,11 @@ for target in $targets; do
     fi
 done
 cargo --version
+promised=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+case $(rustc --version) in
+    "rustc $promised".*) ;;
+    *) echo "test.sh: Rust $promised is promised, $(rustc --version) is what is tested" ;;
+esac
 rustfmt=1 clippy=1
 component rustfmt fmt rustfmt-web || rustfmt=0
 component clippy clippy rust-web-clippy || clippy=0
@@ -124,6 +129,10 @@ say "the robot's firmware for both of its boards"
     ../scripts/thumb-cargo.sh build --locked --release --bin robot &&
     ../scripts/thumb-cargo.sh build --locked --release --package robot-stm32f4)
 
+say 'the engine for processors that are not x86-64'
+scripts/thumb-cargo.sh check --locked --package minimal-surprise-sim \
+    --target aarch64-unknown-linux-gnu
+
 say 'packages'
 cargo package --locked --workspace --exclude tests --exclude robot-support --allow-dirty --no-verify
 
@@ -133,6 +142,19 @@ cargo test --locked --workspace --all-features -- --show-output $without_slurm
 if [ -n "${TEST_ALL:-}" ]; then
     say 'every power cut after every power cut'
     cargo test --locked --release --package minimal-surprise-slots --test power_cuts -- --show-output
+fi
+
+if [ -n "${TEST_ALL:-}" ]; then
+    say 'what the project depends on'
+    cargo deny --version 2>/dev/null || cargo install --locked cargo-deny
+    for manifest in Cargo.toml firmware-example/Cargo.toml; do
+        cargo deny --manifest-path $manifest --config deny.toml check licenses bans sources
+    done
+    if cargo deny fetch db; then
+        cargo deny check advisories
+    else
+        echo 'test.sh: the database of advisories cannot be reached: nothing is looked up there'
+    fi
 fi
 
 say 'everything passed'

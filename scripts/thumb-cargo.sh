@@ -1,10 +1,10 @@
 #!/bin/sh
-# Runs cargo for a Cortex-M4, e.g. in firmware-example:
+# Runs cargo for a Cortex-M4 or, with --target, another processor, e.g. in firmware-example:
 #
 #     ../scripts/thumb-cargo.sh build --release [--target thumbv7em-none-eabi]
 #     scripts/thumb-cargo.sh --compiler [--target …]       only finds the compiler and names it
 #
-# The target's core library comes from the first of these that works:
+# The target's core library (std, if it has an operating system) comes from the first of these that works:
 #
 #   1. the Rust toolchain in use has it;
 #   2. rustup adds it (not tried with RUSTUP_TARGET_ADD=0, for those who know that it cannot);
@@ -26,6 +26,11 @@ export CARGO_BUILD_TARGET="$target"
 
 here=$(dirname "$0")
 version_min=1.95
+
+case $target in
+    *-none-*) library=core ;;
+    *) library=std ;;
+esac
 
 say() { echo "thumb-cargo: $*" >&2; }
 
@@ -70,13 +75,13 @@ if has_target || add_target; then
     named "$(rustc --version)"
     [ "${1:-}" = --compiler ] || exec cargo "$@"
 elif has_system_rust || provide_system_rust; then
-    named "$(system rustc --version), core built from its source"
-    [ "${1:-}" = --compiler ] || system cargo -Z build-std=core \
+    named "$(system rustc --version), $library built from its source"
+    [ "${1:-}" = --compiler ] || system cargo -Z build-std="$library" \
         --config "target.$target.linker='ld.lld'" \
         --config "target.$target.rustflags=['-Clinker-flavor=ld.lld']" \
         "$@"
 else
-    say "no core library for $target. Either of these provides it:"
+    say "no $library library for $target. Either of these provides it:"
     say "    rustup target add $target"
     say "    apt-get install --no-install-recommends $system_packages   (Rust $version_min or newer)"
     exit 69

@@ -99,7 +99,9 @@ pub fn flash_bytes(program: &str) -> u32 {
         .sum()
 }
 
-fn target_dir() -> PathBuf {
+/// The folder that the programs are built in.
+#[must_use]
+pub fn target_dir() -> PathBuf {
     directory().join("target")
 }
 
@@ -108,12 +110,29 @@ fn programs() -> PathBuf {
 }
 
 fn cargo_build(arguments: &[&str]) -> Result<Linked, Missing> {
-    let output = Command::new(directory().join("../scripts/thumb-cargo.sh"))
-        .args(["build", "--release", "--locked"])
+    let arguments = [&["--locked"], arguments].concat();
+    build_in(&directory(), &target_dir(), &arguments)
+}
+
+/// Builds a package for the robot's processor in release.
+///
+/// # Errors
+/// [`Missing`] if there is no compiler for the target.
+///
+/// # Panics
+/// If the script that finds the compiler cannot be run.
+pub fn build_in(
+    directory: &Path,
+    target_dir: &Path,
+    arguments: &[&str],
+) -> Result<Linked, Missing> {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/thumb-cargo.sh");
+    let output = Command::new(script)
+        .args(["build", "--release"])
         .args(arguments)
         .args(["--target", TARGET, "--target-dir"])
-        .arg(target_dir())
-        .current_dir(directory())
+        .arg(target_dir)
+        .current_dir(directory)
         .output()
         .unwrap_or_else(|error| panic!("scripts/thumb-cargo.sh: {error}"));
     let messages = String::from_utf8_lossy(&output.stderr).into_owned();

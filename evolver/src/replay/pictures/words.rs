@@ -2,15 +2,19 @@
 //! whatever fonts are there.
 
 use super::drawing::rounded;
+use skrifa::instance::{LocationRef, Size};
+use skrifa::metrics::GlyphMetrics;
+use skrifa::outline::pen::PathStyle;
+use skrifa::outline::{DrawSettings, OutlinePen};
+use skrifa::{FontRef, GlyphId, MetadataProvider};
 use std::sync::LazyLock;
 use svg::node::element::path::Data;
-use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
 /// Inter, the letters of ASCII and a few signs; see `fonts/README.md`.
 const FONT: &[u8] = include_bytes!("../../../fonts/inter-subset.ttf");
 
-static FACE: LazyLock<Face<'static>> =
-    LazyLock::new(|| Face::parse(FONT, 0).expect("the bundled font is a font"));
+static FACE: LazyLock<FontRef<'static>> =
+    LazyLock::new(|| FontRef::new(FONT).expect("the bundled font is a font"));
 
 /// Height of capitals and digits, as a share of the size.
 pub(super) const CAPITALS: f64 = 0.727;
@@ -29,27 +33,40 @@ pub(super) fn outlines(words: &str, size: f64, (x, y): (f64, f64)) -> Data {
         x,
         y,
     };
+    let glyphs = FACE.outline_glyphs();
     for letter in words.chars() {
-        let glyph = glyph(letter);
+        let id = glyph(letter);
         // A space has no outline.
-        let _ = FACE.outline_glyph(glyph, &mut pen);
-        pen.x += advance(glyph) * pen.scale;
+        if let Some(outline) = glyphs.get(id) {
+            let settings = DrawSettings::unhinted(Size::unscaled(), LocationRef::default())
+                .with_path_style(PathStyle::HarfBuzz);
+            outline
+                .draw(settings, &mut pen)
+                .expect("the bundled font has whole outlines");
+        }
+        pen.x += advance(id) * pen.scale;
     }
     pen.data
 }
 
+fn metrics() -> GlyphMetrics<'static> {
+    FACE.glyph_metrics(Size::unscaled(), LocationRef::default())
+}
+
 fn scale(size: f64) -> f64 {
-    size / f64::from(FACE.units_per_em())
+    let font = FACE.metrics(Size::unscaled(), LocationRef::default());
+    size / f64::from(font.units_per_em)
 }
 
 /// A letter that the font lacks is a question mark.
 fn glyph(letter: char) -> GlyphId {
-    let found = FACE.glyph_index(letter).or_else(|| FACE.glyph_index('?'));
-    found.unwrap_or(GlyphId(0))
+    let letters = FACE.charmap();
+    let found = letters.map(letter).or_else(|| letters.map('?'));
+    found.unwrap_or(GlyphId::NOTDEF)
 }
 
 fn advance(glyph: GlyphId) -> f64 {
-    f64::from(FACE.glyph_hor_advance(glyph).unwrap_or(0))
+    f64::from(metrics().advance_width(glyph).unwrap_or(0.0))
 }
 
 struct Pen {
@@ -72,7 +89,7 @@ impl Pen {
     }
 }
 
-impl OutlineBuilder for Pen {
+impl OutlinePen for Pen {
     fn move_to(&mut self, x: f32, y: f32) {
         let to = self.at(x, y);
         self.add(|data| data.move_to(to));
@@ -112,7 +129,7 @@ mod tests {
     #[test]
     fn every_letter_that_pictures_use_is_in_the_font() {
         let used = (' '..='~').chain("·×–…−".chars());
-        let missing: String = used.filter(|&c| FACE.glyph_index(c).is_none()).collect();
+        let missing: String = used.filter(|&c| FACE.charmap().map(c).is_none()).collect();
         assert_eq!(missing, "");
     }
 }

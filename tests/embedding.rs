@@ -1,0 +1,50 @@
+//! The lines that the README gives to those who embed the controller, built as they stand.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use tests::firmware::{build_in, target_dir};
+use tests::tools::require;
+
+/// The files in the README: fenced blocks whose first line is a comment with a file's name.
+fn files(readme: &str) -> Vec<(&str, &str)> {
+    let blocks = readme.split("\n```").skip(1).step_by(2);
+    let named = blocks.filter_map(|block| {
+        let (_language, contents) = block.split_once('\n')?;
+        let (first, _) = contents.split_once('\n')?;
+        let name = first.trim_start_matches(['#', '/', '*', ' ']);
+        Some((name.trim().split(':').next()?, contents))
+    });
+    named.collect()
+}
+
+#[test]
+fn the_readmes_embedding_lines_build_outside_the_repository() {
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let readme = fs::read_to_string(repository.join("README.md")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    symlink(
+        repository.canonicalize().unwrap(),
+        folder.path().join("minimal-surprise"),
+    )
+    .unwrap();
+    let robot = folder.path().join("my-robot");
+    fs::create_dir_all(robot.join("src")).unwrap();
+    let names = ["Cargo.toml", "src/main.rs", "build.rs", "memory.x"];
+    for name in names {
+        let all = files(&readme);
+        let found = all.iter().find(|(found, _)| *found == name);
+        let (_, contents) = found.unwrap_or_else(|| panic!("no {name} in the README"));
+        fs::write(robot.join(name), contents).unwrap();
+    }
+    let genome = repository.join("tests/fixtures/genomes/b-predefined-line.genome");
+    fs::copy(genome, robot.join("best.genome")).unwrap();
+    // The versions that the robot's firmware is tested with.
+    let versions = repository.join("firmware-example/Cargo.lock");
+    fs::copy(versions, robot.join("Cargo.lock")).unwrap();
+
+    let Some(built) = require(build_in(&robot, &target_dir(), &[])) else {
+        return;
+    };
+    assert!(built.success, "{}", built.messages);
+}
