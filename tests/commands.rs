@@ -382,6 +382,36 @@ fn genome_text_that_is_not_is_refused_with_its_line() {
 }
 
 #[test]
+fn one_generation_is_imported_whatever_the_others_are_like() {
+    let evolver = Evolver::in_empty_folder();
+    for file in ["action_genomes", "prediction_genomes"] {
+        let text = fixture_text(&format!("c/{file}"));
+        let lines: Vec<&str> = text.lines().collect();
+        // Generation 1 is not numbers, and generation 2 lacks its last row.
+        let spoilt = [&lines[..4], &["x"; 3], &lines[7..10]].concat();
+        evolver.write(file, spoilt.join("\n").as_bytes());
+    }
+    let import = |generation: &str| {
+        let files = [
+            "--action",
+            "action_genomes",
+            "--prediction",
+            "prediction_genomes",
+        ];
+        let chosen = ["--generation", generation, "--out", "out"];
+        evolver.run(&[&["import"][..], &files, &chosen].concat())
+    };
+    let first = import("0");
+    assert_eq!(first.code, Some(0), "{first:?}");
+    assert!(evolver.folder().join("out/generation-0.genome").exists());
+    fs::remove_dir_all(evolver.folder().join("out")).unwrap();
+    assert_refused(&import("1"), &["action_genomes, line 5", "\"x\""]);
+    assert_refused(&import("2"), &["action_genomes, line 11", "ends"]);
+    assert_refused(&import("-1"), &["--generation = -1", "0 or more"]);
+    assert!(!evolver.folder().join("out").exists());
+}
+
+#[test]
 fn an_exported_trajectory_is_classified_as_its_run_is() {
     let evolver = with_a_run(&[]);
     let flags = [

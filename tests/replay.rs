@@ -497,6 +497,141 @@ fn a_run_directory_that_is_not_whole_is_refused() {
 }
 
 #[test]
+fn numbers_that_cannot_be_are_refused_in_every_file_of_a_run() {
+    let evolver = with_a_run();
+    let hash = evolver.text("run/DONE");
+    let first_fitness = |value: &str| {
+        let table = evolver.text("run/generations.csv");
+        let (head, rest) = table.split_once('\n').expect("it has lines");
+        let fields: Vec<&str> = rest.splitn(3, ',').collect();
+        format!("{head}\n{},{value},{}", fields[0], fields[2])
+    };
+    let state = |key: &str, value: &str| {
+        let mut state: serde_json::Value =
+            serde_json::from_str(&evolver.text("run/final.json")).expect("it is JSON");
+        let value = serde_json::from_str(value).expect("it is JSON");
+        *state.pointer_mut(key).expect("it has the key") = value;
+        state.to_string()
+    };
+    let time = |text: &str| format!("{{\"wall_s\":{text},\"cpu_s\":1,\"sittings\":1}}");
+    let config = |from: &str, to: &str| evolver.text("run/config.toml").replace(from, to);
+    let cases = [
+        ("DONE", "zzz\n".to_owned(), "64 digits"),
+        (
+            "DONE",
+            hash.replace(['0', '1'], "2"),
+            "another hash than DONE",
+        ),
+        ("generations.csv", first_fitness("inf"), "from 0 to 1"),
+        ("generations.csv", first_fitness("NaN"), "from 0 to 1"),
+        ("generations.csv", first_fitness("-1"), "from 0 to 1"),
+        ("generations.csv", first_fitness("2"), "from 0 to 1"),
+        (
+            "final.json",
+            state("/measures/movement", "-1"),
+            "from 0 to 1",
+        ),
+        (
+            "final.json",
+            state("/measures/temperature/3", "2"),
+            "from 0 to 1",
+        ),
+        (
+            "final.json",
+            state("/measures/temperature", "[]"),
+            "number of steps",
+        ),
+        (
+            "final.json",
+            state("/average_prediction/0", "1.5"),
+            "from 0 to 1",
+        ),
+        ("final.json", state("/average_prediction", "[]"), "sensors"),
+        ("final.json", state("/repetition", "2"), "repetition"),
+        ("final.json", state("/repetition", "-1"), "line 1"),
+        ("final.json", state("/steps_hash", "\"zzz\""), "64 digits"),
+        ("final.json", state("/hash", "\"zzz\""), "64 digits"),
+        ("time.json", time("-1"), "seconds"),
+        ("time.json", time("1e300"), "seconds"),
+        ("meta.json", "{}".to_owned(), "line 1"),
+        (
+            "config.toml",
+            config("generations = 3", "generations = 2"),
+            "generations",
+        ),
+        (
+            "config.toml",
+            config("noise = 0.0", "noise = nan"),
+            "from 0 to 1",
+        ),
+    ];
+    for (file, text, problem) in cases {
+        let file = format!("run/{file}");
+        let good = evolver.read(&file);
+        assert_ne!(text.as_bytes(), good, "{file}");
+        evolver.write(&file, text.as_bytes());
+        let run = evolver.run(&words("replay run --what fitness --svg a.svg"));
+        assert_ne!(run.code, Some(0), "{run:?}");
+        assert!(run.stderr.contains(problem), "{file}: {run:?}");
+        assert_eq!(run.stderr.lines().count(), 1, "{run:?}");
+        assert!(!evolver.folder().join("a.svg").exists(), "{file}");
+        evolver.write(&file, &good);
+    }
+    replay(&evolver, "run --what fitness --svg a.svg");
+    evolver.write("run/DONE", b"zzz\n");
+    let resumed = evolver.run(&["evolve", "--resume", "run"]);
+    assert_ne!(resumed.code, Some(0), "{resumed:?}");
+    assert!(resumed.stderr.contains("64 digits"), "{resumed:?}");
+}
+
+#[test]
+fn what_cannot_be_read_is_not_said_to_be_missing() {
+    let evolver = with_a_run();
+    let run = evolver.folder().join("run");
+    let refused = |arguments: &str, problem: &str| {
+        let run = evolver.run(&words(arguments));
+        assert_ne!(run.code, Some(0), "{run:?}");
+        assert!(run.stderr.contains(problem), "no {problem:?}: {run:?}");
+        assert!(!run.stderr.contains("it has no"), "{run:?}");
+    };
+    let long = "n".repeat(300);
+    let export = "export --format trajectory";
+    for line in [
+        "classify",
+        "replay --svg a",
+        export,
+        "gallery --out g",
+        "evolve --resume",
+    ] {
+        refused(&format!("{line} nowhere"), "nowhere: No such file");
+        refused(&format!("{line} run/DONE/x"), "Not a directory");
+        refused(&format!("{line} {long}"), "File name too long");
+    }
+    for file in [
+        "DONE",
+        "config.toml",
+        "final.json",
+        "best.genome",
+        "meta.json",
+    ] {
+        let good = evolver.read(&format!("run/{file}"));
+        let path = run.join(file);
+        fs::remove_file(&path).unwrap();
+        fs::create_dir(&path).unwrap();
+        refused("replay run --svg a", &format!("run/{file}: Is a directory"));
+        fs::remove_dir(&path).unwrap();
+        std::os::unix::fs::symlink(file, &path).unwrap();
+        refused(
+            "replay run --svg a",
+            &format!("run/{file}: Too many levels"),
+        );
+        fs::remove_file(&path).unwrap();
+        evolver.write(&format!("run/{file}"), &good);
+    }
+    replay(&evolver, "run --svg a");
+}
+
+#[test]
 fn genomes_are_taken_from_run_directories_and_nothing_is_exported_over_a_file() {
     let evolver = with_a_run();
     for line in ["inspect", "export --format c", "export --format hex"] {
@@ -571,7 +706,7 @@ fn a_run_with_the_genome_or_the_state_of_another_is_refused_by_all_who_replay_it
         evolver.write(&file, &bytes);
         for line in lines {
             let run = evolver.run(&words(line));
-            assert_refused(&run, &["error: run: best.genome", "final.json", "another"]);
+            assert_refused(&run, &["error: run: ", "final.json", "another"]);
             assert!(!evolver.folder().join("out").exists(), "{line}");
         }
         evolver.write(&file, &good);

@@ -1,6 +1,7 @@
 //! Suites, run as a user would run them: one machine or many, interrupted or not, one result.
 
 use minimal_surprise_evolver::suite::{Suite, report};
+use minimal_surprise_sim::engine::PATH_VARIABLE;
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use std::collections::BTreeMap;
@@ -457,6 +458,19 @@ fn bad_suites_are_refused_with_their_place() {
         &evolver.run(&["run-task", "--shard", "0/3"]),
         &["--suite <FILE>"],
     );
+    assert_eq!(evolver.files(), ["own.toml"], "nothing was written");
+}
+
+#[test]
+fn a_path_of_the_engine_that_there_is_not_is_refused_before_anything_is_done() {
+    let evolver = with_the_suite();
+    let task = [
+        "run-task", "--suite", "own.toml", "--shard", "0/2", "--out", "suite",
+    ];
+    for arguments in [&RUN[..], &task] {
+        let run = evolver.run_with((PATH_VARIABLE, "abacus"), arguments);
+        assert_refused(&run, &[PATH_VARIABLE, "abacus", "portable"]);
+    }
     assert_eq!(evolver.files(), ["own.toml"], "nothing was written");
 }
 

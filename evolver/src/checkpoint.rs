@@ -64,7 +64,11 @@ pub fn encode(experiment: &Experiment, settings_text: &str) -> Vec<u8> {
         hash: experiment.hash(),
         best: experiment.best().map(weights),
     };
-    let mut bytes = postcard::to_allocvec(&stored).expect("memory is the only limit");
+    sealed(&stored)
+}
+
+fn sealed(stored: &Stored) -> Vec<u8> {
+    let mut bytes = postcard::to_allocvec(stored).expect("memory is the only limit");
     let crc = CRC_32C.checksum(&bytes);
     bytes.extend(crc.to_le_bytes());
     bytes
@@ -108,6 +112,7 @@ pub fn decode(
     if genomes.len() as u64 != u64::from(settings.population) {
         return Err(Damaged("the population has another size"));
     }
+    check(&stored, &settings).map_err(Damaged)?;
     let population = Population::restored(stored.generation, genomes);
     Ok(Experiment::restored(
         settings,
@@ -118,7 +123,90 @@ pub fn decode(
     ))
 }
 
+/// Whether the numbers are such as an evolution under these settings has.
+fn check(stored: &Stored, settings: &Settings) -> Result<(), &'static str> {
+    let (done, all) = (stored.history.len() as u64, u64::from(settings.generations));
+    if done > all || stored.best.is_some() != (done > 0) {
+        return Err("it has another number of generations than config.toml");
+    }
+    // The last generation is not followed by another population.
+    if u64::from(stored.generation) != done.min(all - 1) {
+        return Err("its population is of another generation");
+    }
+    let bits = settings.scored_bits();
+    let is_possible = |(expected, record): (u32, &GenerationRecord)| {
+        record.generation == expected
+            && record.best_slot < settings.population
+            && record.worst_repetition < settings.repetitions
+            && record.worst_matches <= record.best_matches
+            && record.best_matches <= bits
+            && record.total_matches <= bits.saturating_mul(settings.population.into())
+    };
+    if !(0..).zip(&stored.history).all(is_possible) {
+        return Err("a generation has numbers that cannot be");
+    }
+    Ok(())
+}
+
 fn genome(topology: Topology, weights: &[i16]) -> Result<Genome, CheckpointError> {
     Genome::from_weights(topology, weights)
         .map_err(|_| CheckpointError::Damaged("a genome does not fit the topology"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Given;
+    use minimal_surprise_sim::{Engine, Path};
+    use std::sync::atomic::AtomicBool;
+
+    fn settings() -> Settings {
+        let mut given = Given::default();
+        for (key, value) in [
+            ("grid", "8x8"),
+            ("robots", "20"),
+            ("population", "4"),
+            ("generations", "3"),
+            ("repetitions", "2"),
+            ("steps", "20"),
+        ] {
+            given.flag(key, Some(value));
+        }
+        Settings::resolve(&given, || 1).unwrap()
+    }
+
+    /// What becomes of a checkpoint after two of three generations, changed with a correct checksum.
+    fn decoded(change: impl FnOnce(&mut Stored)) -> Result<Experiment, CheckpointError> {
+        let mut experiment = Experiment::new(settings());
+        for _ in 0..2 {
+            let _ = experiment.advance(Engine::Plain, Path::Portable, &AtomicBool::new(false));
+        }
+        let bytes = encode(&experiment, "text");
+        let mut stored = postcard::from_bytes(&bytes).unwrap();
+        change(&mut stored);
+        decode(&sealed(&stored), settings(), "text")
+    }
+
+    #[test]
+    fn a_checkpoint_with_numbers_that_cannot_be_is_damaged() {
+        assert_eq!(decoded(|_| {}).unwrap().history().len(), 2);
+        let changes: [fn(&mut Stored); 12] = [
+            |stored| stored.generation = 1,
+            |stored| stored.generation = u32::MAX,
+            |stored| stored.best = None,
+            |stored| stored.history.clear(),
+            |stored| stored.history.extend_from_within(..),
+            |stored| stored.history[1].generation = 0,
+            |stored| stored.history[1].best_slot = 4,
+            |stored| stored.history[1].worst_repetition = 2,
+            |stored| stored.history[1].best_matches = u64::MAX,
+            |stored| stored.history[0].total_matches = u64::MAX,
+            |stored| stored.history[0].movement = f64::NAN,
+            |stored| stored.history[0].share = -1.0,
+        ];
+        for (place, change) in changes.into_iter().enumerate() {
+            let error = decoded(change).expect_err("it is damaged");
+            assert!(matches!(error, CheckpointError::Damaged(_)), "{place}");
+        }
+    }
 }

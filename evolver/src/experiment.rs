@@ -2,6 +2,7 @@
 
 use crate::evolution::{Population, best_slot};
 use crate::generation_work::Work;
+use crate::ranges;
 use crate::run_hash::RunHash;
 use crate::settings::Settings;
 use crate::steps_hash::{StepsHash, Version};
@@ -29,12 +30,15 @@ pub struct GenerationRecord {
     /// The repetition that gave the best genome its fitness, its worst one.
     pub worst_repetition: u32,
     /// Robot movement M in that repetition (paper, Eq. 4).
+    #[serde(deserialize_with = "ranges::fraction")]
     pub movement: f64,
     /// Intended robot movement I in that repetition (paper, Eq. 5).
+    #[serde(deserialize_with = "ranges::fraction")]
     pub intended_movement: f64,
     /// Structures that the repetition's final state is named after, `;` between them.
     pub structure: String,
     /// Share of robots in that structure, 0 to 1.
+    #[serde(deserialize_with = "ranges::fraction")]
     pub share: f64,
 }
 
@@ -150,7 +154,7 @@ impl Experiment {
         let matches: Vec<u64> = evaluations.iter().map(|e| e.matches).collect();
         let best = best_slot(&matches);
         let worst_repetition = evaluations[best].worst_repetition;
-        let (motion, poses) = Evaluator::new(Engine::Fast, path).motion(
+        let (motion, poses) = Evaluator::new(engine, path).motion(
             &self.population.ask()[best],
             work.trials(),
             worst_repetition,

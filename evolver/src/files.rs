@@ -213,6 +213,14 @@ fn target(path: &Path) -> io::Result<PathBuf> {
     fs::metadata(path).map(|_| target)
 }
 
+/// Whether there is something of this name, symbolic links followed.
+///
+/// # Errors
+/// [`FileError`] if that cannot be known, as where a folder must not be looked into.
+pub fn exists(path: &Path) -> Result<bool, FileError> {
+    path.try_exists().map_err(FileError::at(path))
+}
+
 /// Most bytes of a file that a person writes, or that says a few things about a run: settings,
 /// suites, notes, `meta.json`, `time.json`, `DONE`.
 pub const TEXT_BYTES_MAX: u64 = 16 << 20;
@@ -248,8 +256,10 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
     let too_large = |error: TooLarge| io::Error::new(io::ErrorKind::FileTooLarge, error);
     let read = || {
         let file = File::open(path)?;
-        let found = file.metadata()?.len();
-        if found > most {
+        let metadata = file.metadata()?;
+        let found = metadata.len();
+        // That a directory is in its place is said by reading.
+        if found > most && !metadata.is_dir() {
             return Err(too_large(TooLarge::Sized { found, most }));
         }
         let mut bytes = Vec::with_capacity(found as usize);

@@ -1,8 +1,10 @@
 //! Reading a complete run directory back: the genome, where it started from, where it ended.
 
 use crate::files::{self, DATA_BYTES_MAX, FileError, TEXT_BYTES_MAX};
+use crate::ranges;
 use crate::settings::{Given, SettingError, Settings};
 use crate::steps_hash::{RecordedHash, StepsHash, Version};
+use crate::time_spent::TimeSpent;
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_controller::{Controller, DecodeError, EncodedGenome, Genome, Provenance};
 use minimal_surprise_sim::evaluation::run;
@@ -33,6 +35,18 @@ pub struct FinishedRun {
     pub steps_hash: Option<RecordedHash>,
     /// Best fitness of every generation.
     pub best_fitness: Vec<f64>,
+    /// Movement M of the final run.
+    pub movement: f64,
+    /// Intended movement I.
+    pub intended_movement: f64,
+    /// Temperature of every step.
+    pub temperature: Vec<f64>,
+    /// Average prediction of every sensor.
+    pub average_prediction: Vec<f64>,
+    /// Program, version and revision that did it.
+    pub program: String,
+    /// How long it took.
+    pub time: TimeSpent,
 }
 
 /// A run directory cannot be read back.
@@ -75,6 +89,14 @@ pub enum ReadRunError {
     /// A final state is not one.
     #[error(transparent)]
     State(#[from] StateError),
+    /// A file is not the JSON that it should be.
+    #[error("{}: {error}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with line and column.
+        error: serde_json::Error,
+    },
     /// The table of the generations is not one.
     #[error("{}: {error}", path.display())]
     Generations {
@@ -82,6 +104,14 @@ pub enum ReadRunError {
         path: PathBuf,
         /// What is wrong, and where.
         error: csv::Error,
+    },
+    /// A value in a file cannot be.
+    #[error("{}: {problem}", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The value, and what would be valid.
+        problem: String,
     },
     /// The directory's files do not belong together.
     #[error("{}: {problem}", path.display())]
@@ -142,6 +172,23 @@ pub enum StateError {
     },
 }
 
+impl ReadRunError {
+    /// Whether there is no complete run, as opposed to one that is damaged or cannot be read.
+    #[must_use]
+    pub fn is_unfinished(&self) -> bool {
+        matches!(self, Self::NotComplete { missing: DONE, .. })
+    }
+
+    /// What is wrong, without what to do about it.
+    #[must_use]
+    pub fn cause(&self) -> &Self {
+        match self {
+            Self::Damaged { error, .. } => error,
+            other => other,
+        }
+    }
+}
+
 /// What is read of a `final.json`.
 #[derive(Clone, Debug)]
 pub struct FinalState {
@@ -153,14 +200,34 @@ pub struct FinalState {
     pub final_poses: Vec<Pose>,
     /// The repetition that it was run from.
     pub repetition: u32,
+    /// The run's hash.
+    pub hash: String,
     /// The hash of the steps in between, if the file has it.
     pub steps_hash: Option<RecordedHash>,
+    /// Movement M.
+    pub movement: f64,
+    /// Intended movement I.
+    pub intended_movement: f64,
+    /// Temperature of every step.
+    pub temperature: Vec<f64>,
+    /// Average prediction of every sensor.
+    pub average_prediction: Vec<f64>,
 }
 
 /// What is read of a line of `generations.csv`.
 #[derive(Deserialize)]
 struct GenerationLine {
+    generation: u32,
+    #[serde(deserialize_with = "ranges::fraction")]
     best_fitness: f64,
+}
+
+/// What is read of a `meta.json`.
+#[derive(Deserialize)]
+struct MetaFile {
+    program: String,
+    program_version: String,
+    revision: String,
 }
 
 #[derive(Deserialize)]
@@ -172,10 +239,27 @@ struct VersionOnly {
 struct FinalFile {
     grid: String,
     repetition: u32,
+    #[serde(deserialize_with = "ranges::hash")]
+    hash: String,
+    #[serde(default, deserialize_with = "ranges::optional_hash")]
     steps_hash: Option<String>,
+    #[serde(default, deserialize_with = "ranges::optional_hash")]
     steps_hash_v2: Option<String>,
+    #[serde(deserialize_with = "ranges::fractions")]
+    average_prediction: Vec<f64>,
+    measures: MeasuresFile,
     start: Vec<Pose>,
     r#final: Vec<Pose>,
+}
+
+#[derive(Deserialize)]
+struct MeasuresFile {
+    #[serde(deserialize_with = "ranges::fraction")]
+    movement: f64,
+    #[serde(deserialize_with = "ranges::fraction")]
+    intended_movement: f64,
+    #[serde(deserialize_with = "ranges::fractions")]
+    temperature: Vec<f64>,
 }
 
 fn check_version(path: &Path, bytes: &[u8]) -> Result<(), StateError> {
@@ -230,62 +314,84 @@ pub fn parse_final_state(path: &Path, bytes: &[u8]) -> Result<FinalState, StateE
         repetition: file.repetition,
         steps_hash: recorded(file.steps_hash_v2, Version::V2)
             .or_else(|| recorded(file.steps_hash, Version::V1)),
+        hash: file.hash,
+        movement: file.measures.movement,
+        intended_movement: file.measures.intended_movement,
+        temperature: file.measures.temperature,
+        average_prediction: file.average_prediction,
     })
 }
 
 fn best_fitness(path: &Path) -> Result<Vec<f64>, ReadRunError> {
-    csv::Reader::from_reader(files::read(path, DATA_BYTES_MAX)?.as_slice())
-        .deserialize()
-        .map(|line| line.map(|line: GenerationLine| line.best_fitness))
-        .collect::<Result<_, _>>()
-        .map_err(|error| ReadRunError::Generations {
+    let bytes = files::read(path, DATA_BYTES_MAX)?;
+    let mut table = csv::Reader::from_reader(bytes.as_slice());
+    let mut values = Vec::new();
+    for (expected, line) in (0..).zip(table.deserialize()) {
+        let line: GenerationLine = line.map_err(|error| ReadRunError::Generations {
             path: path.to_owned(),
             error,
-        })
+        })?;
+        if line.generation != expected {
+            return Err(ReadRunError::Value {
+                path: path.to_owned(),
+                problem: format!("generation {} where {expected} should be", line.generation),
+            });
+        }
+        values.push(line.best_fitness);
+    }
+    Ok(values)
 }
 
-/// The files of a complete run that it cannot be read back without.
+/// Marks a run as complete, and holds its hash.
+const DONE: &str = "DONE";
+
+/// The other files of a complete run that it cannot be read back without.
 const FILES: [&str; 5] = [
-    "DONE",
     "config.toml",
+    "meta.json",
     "best.genome",
     "final.json",
     "generations.csv",
 ];
 
-fn all_there(path: &Path, files: &[&'static str]) -> Result<(), ReadRunError> {
-    match files.iter().find(|file| !path.join(file).is_file()) {
-        None => Ok(()),
-        Some(missing) => Err(ReadRunError::NotComplete {
-            path: path.to_owned(),
-            missing,
-        }),
+fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
+    if files::exists(&run.join(file))? {
+        return Ok(());
     }
+    // Of a directory that is not there, no file is missing.
+    std::fs::metadata(run).map_err(FileError::at(run))?;
+    Err(ReadRunError::NotComplete {
+        path: run.to_owned(),
+        missing: file,
+    })
 }
 
-/// Whether a run is complete, by a quick look at its directory.
+fn recorded_hash(run: &Path) -> Result<String, ReadRunError> {
+    let path = run.join(DONE);
+    let bytes = files::read(&path, TEXT_BYTES_MAX)?;
+    ranges::hash_of(&String::from_utf8_lossy(&bytes))
+        .map_err(|problem| ReadRunError::Value { path, problem })
+}
+
+/// The hash of a run, if it is complete, by a quick look at its directory.
 ///
 /// # Errors
-/// [`ReadRunError::Damaged`] if it is marked so, but a file is missing or of another layout.
-pub fn is_complete(path: &Path) -> Result<bool, ReadRunError> {
-    if !path.join("DONE").is_file() {
-        return Ok(false);
+/// [`ReadRunError::Damaged`] if it is marked complete, but a file is missing or of another layout,
+/// or the mark is not its hash.
+pub fn complete(path: &Path) -> Result<Option<String>, ReadRunError> {
+    if !files::exists(&path.join(DONE))? {
+        return Ok(None);
     }
     let look = || {
-        all_there(path, &FILES)?;
-        all_there(path, &["meta.json"])?;
+        FILES.into_iter().try_for_each(|file| require(path, file))?;
         let state = path.join("final.json");
-        Ok(check_version(
-            &state,
-            &files::read(&state, DATA_BYTES_MAX)?,
-        )?)
+        check_version(&state, &files::read(&state, DATA_BYTES_MAX)?)?;
+        recorded_hash(path)
     };
-    look()
-        .map(|()| true)
-        .map_err(|error| ReadRunError::Damaged {
-            path: path.to_owned(),
-            error: Box::new(error),
-        })
+    look().map(Some).map_err(|error| ReadRunError::Damaged {
+        path: path.to_owned(),
+        error: Box::new(error),
+    })
 }
 
 impl FinishedRun {
@@ -329,7 +435,8 @@ impl FinishedRun {
     /// # Errors
     /// [`ReadRunError`] if the run is not complete, or a file in it is wrong.
     pub fn read(path: &Path) -> Result<Self, ReadRunError> {
-        all_there(path, &FILES)?;
+        require(path, DONE)?;
+        FILES.into_iter().try_for_each(|file| require(path, file))?;
         let mut given = Given::default();
         given.file(&path.join("config.toml"))?;
         given.forget("from");
@@ -356,22 +463,54 @@ impl FinishedRun {
         {
             return inconsistent("final.json has another grid or swarm size than config.toml");
         }
+        if state.repetition >= settings.repetitions {
+            return inconsistent("final.json is of a repetition that config.toml does not have");
+        }
+        if state.temperature.len() != settings.scenario.steps() as usize
+            || state.average_prediction.len() != settings.topology.sensors()
+        {
+            return inconsistent(
+                "final.json has another number of steps or sensors than config.toml",
+            );
+        }
+        let hash = recorded_hash(path)?;
+        if state.hash != hash {
+            return inconsistent("final.json has another hash than DONE");
+        }
         let best_fitness = best_fitness(&path.join("generations.csv"))?;
         if best_fitness.len() != settings.generations as usize {
             return inconsistent(
                 "generations.csv has another number of lines than config.toml has generations",
             );
         }
-        let hash = files::read(&path.join("DONE"), TEXT_BYTES_MAX)?;
+        let provenance = encoded.provenance();
+        if provenance.generation != settings.generations - 1 {
+            return inconsistent("best.genome is not of the last generation of config.toml");
+        }
+        let meta_path = path.join("meta.json");
+        let meta = serde_json::from_slice(&files::read(&meta_path, TEXT_BYTES_MAX)?);
+        let meta: MetaFile = meta.map_err(|error| ReadRunError::Json {
+            path: meta_path,
+            error,
+        })?;
         Ok(Self {
             genome: encoded.to_genome(),
-            provenance: encoded.provenance(),
+            provenance,
             repetition: state.repetition,
             starts: state.starts,
             final_poses: state.final_poses,
-            hash: String::from_utf8_lossy(&hash).trim().to_owned(),
+            hash,
             steps_hash: state.steps_hash,
             best_fitness,
+            movement: state.movement,
+            intended_movement: state.intended_movement,
+            temperature: state.temperature,
+            average_prediction: state.average_prediction,
+            program: format!(
+                "{} {}, revision {}",
+                meta.program, meta.program_version, meta.revision
+            ),
+            time: TimeSpent::read(path)?,
             settings,
         })
     }

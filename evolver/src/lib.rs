@@ -22,6 +22,7 @@ pub mod generation_work;
 pub mod hil;
 pub mod lock;
 pub mod new_dir;
+mod ranges;
 pub mod reevaluation;
 pub mod replay;
 pub mod report;

@@ -16,13 +16,14 @@
 use crate::checkpoint::{self, CheckpointError};
 use crate::experiment::{Experiment, Finding};
 use crate::files::{self, DATA_BYTES_MAX, FileError, TEXT_BYTES_MAX};
-use crate::finished_run::{ReadRunError, is_complete};
+use crate::finished_run::{ReadRunError, complete};
 use crate::lock::{Holder, LOCK, Lock, LockError};
 use crate::new_dir::NewDir;
 use crate::report::tables;
 use crate::settings::{Given, SettingError, Settings};
-use crate::time_spent::{TimeSpent, Timer};
+use crate::time_spent::{TIME, TimeSpent, Timer};
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
+use minimal_surprise_sim::engine::PathError;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -53,6 +54,9 @@ pub enum RunDirError {
     /// There is something already; nothing is ever overwritten.
     #[error("{} exists; name a directory that does not, or continue with --resume", .0.display())]
     Exists(PathBuf),
+    /// There is no such directory.
+    #[error(transparent)]
+    NotThere(FileError),
     /// The directory holds no run.
     #[error("{} is not a run directory: it has no {missing}", path.display())]
     NotARun {
@@ -78,6 +82,9 @@ pub enum RunDirError {
     /// The settings in it are wrong.
     #[error(transparent)]
     Settings(#[from] SettingError),
+    /// The environment asks for a path of the engine that there is not.
+    #[error(transparent)]
+    EnginePath(#[from] PathError),
     /// The checkpoint in it cannot be continued from.
     #[error("{}: {error}", path.display())]
     Checkpoint {
@@ -102,7 +109,6 @@ const META: &str = "meta.json";
 const GENERATIONS: &str = "generations.csv";
 const BEST: &str = "best.genome";
 const FINAL: &str = "final.json";
-const TIME: &str = "time.json";
 const DONE: &str = "DONE";
 
 /// What `--resume` finds.
@@ -173,7 +179,9 @@ impl RunDir {
             return Ok(Found::Finished(hash));
         }
         let config = path.join(CONFIG);
-        if !config.is_file() {
+        if !files::exists(&config)? {
+            fs::metadata(path)
+                .map_err(|error| RunDirError::NotThere(FileError::at(path)(error)))?;
             return Err(missing(CONFIG));
         }
         let lock = lock(path)?;
@@ -182,7 +190,7 @@ impl RunDir {
             return Ok(Found::Finished(hash));
         }
         let checkpoint = path.join(CHECKPOINT);
-        if !checkpoint.is_file() {
+        if !files::exists(&checkpoint)? {
             return Err(missing(CHECKPOINT));
         }
         let mut given = Given::default();
@@ -199,9 +207,7 @@ impl RunDir {
                 error,
             }
         })?;
-        // A run from before there was such a file has none.
-        let spent = files::read(&path.join(TIME), TEXT_BYTES_MAX)
-            .map_or_else(|_| TimeSpent::default(), |bytes| TimeSpent::of_json(&bytes));
+        let spent = TimeSpent::read(path)?;
         let run = Self {
             path: path.to_owned(),
             settings_text,
@@ -286,14 +292,12 @@ impl RunDir {
 
 /// The hash of a complete run; what is not needed any more is removed.
 fn finished(directory: &Path) -> Result<Option<String>, RunDirError> {
-    if !is_complete(directory)? {
+    let Some(hash) = complete(directory)? else {
         return Ok(None);
-    }
-    let done = directory.join(DONE);
-    let hash = files::read(&done, TEXT_BYTES_MAX)?;
+    };
     // It is only in the way of the eye, and the directory need not be ours.
     let _ = tidy(directory);
-    Ok(Some(String::from_utf8_lossy(&hash).trim().to_owned()))
+    Ok(Some(hash))
 }
 
 /// Removes what a complete run does not need: checkpoint, lock, and files whose writing was cut

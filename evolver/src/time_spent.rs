@@ -3,26 +3,41 @@
 //! Written with every checkpoint, so that at most a generation's time is lost with a process. It is
 //! no part of a result, and no hash covers it.
 
+use crate::files::{self, FileError, TEXT_BYTES_MAX};
+use crate::ranges;
 use crate::usage::Stopwatch;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 use std::time::Instant;
+
+/// Its file in a run directory.
+pub const TIME: &str = "time.json";
 
 /// `time.json`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TimeSpent {
     /// Seconds on the clock.
+    #[serde(deserialize_with = "ranges::seconds")]
     pub wall_s: f64,
     /// Seconds of computing, all threads together.
+    #[serde(deserialize_with = "ranges::seconds")]
     pub cpu_s: f64,
     /// How often it was begun or gone on with.
     pub sittings: u32,
 }
 
 impl TimeSpent {
-    /// What a file says; nothing if it says nothing.
-    #[must_use]
-    pub fn of_json(bytes: &[u8]) -> Self {
-        serde_json::from_slice(bytes).unwrap_or_default()
+    /// What the file in a run directory says; a run of an older program has none.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read or its numbers are not times.
+    pub fn read(run: &Path) -> Result<Self, FileError> {
+        let path = run.join(TIME);
+        if !files::exists(&path)? {
+            return Ok(Self::default());
+        }
+        let read = serde_json::from_slice(&files::read(&path, TEXT_BYTES_MAX)?);
+        read.map_err(|error: serde_json::Error| FileError::at(&path)(error.into()))
     }
 
     /// The file.
@@ -44,7 +59,7 @@ impl TimeSpent {
         Self {
             wall_s: self.wall_s + other.wall_s,
             cpu_s: self.cpu_s + other.cpu_s,
-            sittings: self.sittings + other.sittings,
+            sittings: self.sittings.saturating_add(other.sittings),
         }
     }
 }
@@ -90,10 +105,26 @@ mod tests {
             cpu_s: 4.125,
             sittings: 2,
         };
-        assert_eq!(TimeSpent::of_json(before.json().as_bytes()), before);
+        let run = tempfile::tempdir().unwrap();
+        let read = |text: &str| {
+            std::fs::write(run.path().join(TIME), text).unwrap();
+            TimeSpent::read(run.path())
+        };
+        assert_eq!(read(&before.json()).unwrap(), before);
         let spent = Timer::after(before).spent();
         assert_eq!(spent.sittings, 3);
         assert!(spent.wall_s >= 2.5 && spent.cpu_s >= 4.125);
-        assert_eq!(TimeSpent::of_json(b"{"), TimeSpent::default());
+        let bad = [
+            "{".to_owned(),
+            before.json().replace("2.5", "-2.5"),
+            before.json().replace("4.125", "1e300"),
+            before.json().replace('2', "2e99"),
+        ];
+        for text in bad {
+            let error = read(&text).unwrap_err().to_string();
+            assert!(error.contains(TIME) && error.contains("line 1"), "{error}");
+        }
+        std::fs::remove_file(run.path().join(TIME)).unwrap();
+        assert_eq!(TimeSpent::read(run.path()).unwrap(), TimeSpent::default());
     }
 }

@@ -3,6 +3,7 @@
 //! Fitness (paper, Eq. 1) is held as the integer number of matches: bits that were as predicted
 //! one step before. A genome's fitness is the smallest over its repetitions.
 
+use crate::metrics::{Measures, Motion};
 use crate::scenario::{Scenario, Trial};
 use crate::torus::Pose;
 use crate::world::{World, WorldError};
@@ -81,6 +82,20 @@ pub fn run(
         predicted_occupied: occupied[..controller.topology().sensors()].to_vec(),
         final_poses: world.poses().to_vec(),
     })
+}
+
+/// How the robots of one trial move, and where they end.
+///
+/// # Panics
+/// If the trial's poses do not fit the grid.
+#[must_use]
+pub fn motion(genome: &Genome, scenario: &Scenario, trial: &Trial) -> (Motion, Vec<Pose>) {
+    let mut measures = Measures::starting_from(scenario.grid(), genome.topology(), &trial.starts);
+    let outcome = run(&Controller::new(genome), scenario, trial, |world| {
+        measures.observe(world);
+    })
+    .expect("trials are drawn on the scenario's grid");
+    (measures.motion().clone(), outcome.final_poses)
 }
 
 /// A genome's fitness over all trials.

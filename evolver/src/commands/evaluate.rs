@@ -127,7 +127,7 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
 /// The settings of the run that the genome came out of, if it lies in a run directory.
 fn conditions_beside(genome: &Path) -> Result<Option<Settings>, BadInput> {
     let config = genome.with_file_name("config.toml");
-    if !config.is_file() {
+    if !files::exists(&config).map_err(BadInput::new)? {
         return Ok(None);
     }
     let mut given = Given::default();

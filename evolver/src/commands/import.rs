@@ -9,7 +9,7 @@ use clap::Args;
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
 use minimal_surprise_controller::{Prediction, Provenance, SensorModel, Template, Topology};
 use minimal_surprise_sim::exchange::{
-    ExchangeError, GenomeRows, ImportedGenome, import_genome, read_genomes,
+    ExchangeError, GenomeRows, ImportedGenome, generations, import_genome,
 };
 use std::path::{Path, PathBuf};
 
@@ -44,43 +44,37 @@ pub struct ImportArgs {
 /// # Errors
 /// [`BadInput`] names the file and the line.
 pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
-    let action = read(&arguments.action)?;
-    let prediction = arguments.prediction.as_deref().map(read).transpose()?;
+    let only = match &arguments.generation {
+        None => None,
+        Some(text) => Some(flag("generation", text, |text| {
+            let number: Result<u32, _> = text.parse();
+            number.map_err(|_| "expected a whole number, 0 or more".to_owned())
+        })?),
+    };
+    let action = read(&arguments.action, only)?;
+    let prediction = match &arguments.prediction {
+        None => None,
+        Some(path) => Some((path, read(path, only)?)),
+    };
     let topology = topology(arguments, &action)?;
-    if let Some(prediction) = &prediction
+    if let Some((path, prediction)) = &prediction
         && prediction.len() != action.len()
     {
         return Err(BadInput::new(format!(
             "{} holds {} generations, {} holds {}",
             arguments.action.display(),
             action.len(),
-            arguments
-                .prediction
-                .as_deref()
-                .unwrap_or(Path::new(""))
-                .display(),
+            path.display(),
             prediction.len()
         ))
         .into());
     }
-    let generations = match &arguments.generation {
-        None => 0..action.len(),
-        Some(text) => {
-            let chosen = flag("generation", text, |text| match text.parse() {
-                Ok(generation) if generation < action.len() => Ok(generation),
-                _ => Err(format!(
-                    "the file holds generations 0 to {}",
-                    action.len() - 1
-                )),
-            })?;
-            chosen..chosen + 1
-        }
-    };
-    let imported = generations
-        .map(|generation| {
-            let prediction = prediction.as_ref().map(|rows| &rows[generation]);
-            import_genome(topology, &action[generation], prediction)
-                .map(|genome| (generation as u32, genome))
+    let imported = action
+        .iter()
+        .enumerate()
+        .map(|(place, (generation, action))| {
+            let prediction = prediction.as_ref().map(|(_, rows)| &rows[place].1);
+            import_genome(topology, action, prediction).map(|genome| (*generation, genome))
         })
         .collect::<Result<Vec<_>, _>>()
         .map_err(|error| {
@@ -97,15 +91,35 @@ pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn read(path: &Path) -> Result<Vec<GenomeRows>, BadInput> {
+/// The generations in a file, with their numbers; if only one is wanted, no other has to be right.
+fn read(path: &Path, only: Option<u32>) -> Result<Vec<(u32, GenomeRows)>, BadInput> {
     let bytes = files::read(path, DATA_BYTES_MAX).map_err(BadInput::new)?;
-    read_genomes(&String::from_utf8_lossy(&bytes))
-        .map_err(|error: ExchangeError| BadInput::new(format!("{}, {error}", path.display())))
+    let text = String::from_utf8_lossy(&bytes);
+    let about = |error: ExchangeError| BadInput::new(format!("{}, {error}", path.display()));
+    let (mut found, mut count) = (Vec::new(), 0);
+    for (generation, rows) in (0..).zip(generations(&text)) {
+        let rows = rows.map_err(about)?;
+        count += 1;
+        if only.is_none_or(|only| only == generation) {
+            found.push((generation, rows.numbers().map_err(about)?));
+        }
+        if only == Some(generation) {
+            break;
+        }
+    }
+    match only {
+        Some(only) if found.is_empty() => Err(BadInput::new(format!(
+            "--generation = {only}: {} holds generations 0 to {}",
+            path.display(),
+            count - 1
+        ))),
+        _ => Ok(found),
+    }
 }
 
 /// As the flags say; what they leave open, by the length to which rows are filled up.
-fn topology(arguments: &ImportArgs, action: &[GenomeRows]) -> Result<Topology, BadInput> {
-    let length = action.first().map_or(0, |rows| rows.rows[0].len());
+fn topology(arguments: &ImportArgs, action: &[(u32, GenomeRows)]) -> Result<Topology, BadInput> {
+    let length = action.first().map_or(0, |(_, rows)| rows.rows[0].len());
     let mut given = Given::default();
     given.flag("sensor-model", arguments.sensor_model.as_deref());
     given.flag("predefine", arguments.predefine.as_deref());

@@ -18,6 +18,7 @@ use crate::suite::search::{Search, look};
 use crate::suite::work::{Progress, Shard, Worked, progress, work_on};
 use crate::suite::{PAPER, Resilience, Suite, slurm};
 use clap::{Args, Subcommand, ValueEnum};
+use minimal_surprise_sim::Path as CodePath;
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -259,7 +260,6 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
             let written = report::write(&plan, &read.suite, &directory, &out, &read.called)
                 .map_err(|error| match error {
                     ReportError::Run(error) => BadInput::new(error).into(),
-                    ReportError::Json { .. } => BadInput::new(error).into(),
                     other => anyhow::Error::from(other),
                 })?;
             show_line!(
@@ -555,6 +555,8 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
         Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
         None => None,
     };
+    // What `evolve` refuses, too, before anything is done.
+    CodePath::from_environment().map_err(BadInput::new)?;
     let runs = shard.of_plan(plan);
     let stop = stop_on_signal()?;
     let pool = thread_pool(threads)?;

@@ -7,7 +7,8 @@
 use super::plan::{Plan, PlannedRun, Runs};
 use crate::evolving::until_finished;
 use crate::experiment::Experiment;
-use crate::finished_run::{ReadRunError, is_complete};
+use crate::files;
+use crate::finished_run::{ReadRunError, complete};
 use crate::run_dir::{Found, RunDir, RunDirError};
 use minimal_surprise_sim::{Engine, Path as CodePath};
 use std::path::Path;
@@ -73,9 +74,9 @@ pub enum Progress {
 /// [`ReadRunError::Damaged`] if it is marked complete, and is not.
 pub fn progress(run: &PlannedRun, suite: &Path) -> Result<Progress, ReadRunError> {
     let directory = run.directory(suite);
-    Ok(if is_complete(&directory)? {
+    Ok(if complete(&directory)?.is_some() {
         Progress::Done
-    } else if directory.is_dir() {
+    } else if files::exists(&directory)? {
         Progress::Begun
     } else {
         Progress::Pending
@@ -123,7 +124,7 @@ fn begin_or_go_on(
         Err(RunDirError::InUse { .. }) => return Ok(Worked::Elsewhere),
         Err(error) => return Err(error),
     };
-    let path = CodePath::from_environment().unwrap_or_else(|_| CodePath::best());
+    let path = CodePath::from_environment()?;
     let finished = until_finished(
         &mut experiment,
         &held,
@@ -148,12 +149,14 @@ fn begin_or_go_on(
 fn open(run: &PlannedRun, directory: &Path) -> Result<Option<(Experiment, RunDir)>, RunDirError> {
     let experiment = Experiment::new(run.settings.clone());
     match found(directory) {
-        Err(RunDirError::NotARun { .. }) => match RunDir::create(directory, &experiment) {
-            Ok(held) => Ok(Some((experiment, held.with_table_last()))),
-            // Another process has just made it.
-            Err(RunDirError::Exists(_)) => found(directory),
-            Err(error) => Err(error),
-        },
+        Err(RunDirError::NotARun { .. } | RunDirError::NotThere(_)) => {
+            match RunDir::create(directory, &experiment) {
+                Ok(held) => Ok(Some((experiment, held.with_table_last()))),
+                // Another process has just made it.
+                Err(RunDirError::Exists(_)) => found(directory),
+                Err(error) => Err(error),
+            }
+        }
         found => found,
     }
 }

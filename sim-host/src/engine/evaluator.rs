@@ -163,8 +163,8 @@ impl Evaluator {
         }
     }
 
-    /// How the robots of one repetition move, and where they end: the world alone, without
-    /// predictions.
+    /// How the robots of one repetition move, and where they end: what [`evaluation::motion`]
+    /// gives; the fast engine runs the world alone, without predictions.
     ///
     /// # Panics
     /// If the trials are for another sensor model, or there is no such repetition.
@@ -174,6 +174,10 @@ impl Evaluator {
         trials: &TrialSet,
         repetition: u32,
     ) -> (Motion, Vec<Pose>) {
+        if self.engine == Engine::Plain {
+            let trial = &trials.trials[repetition as usize];
+            return evaluation::motion(genome, &trials.scenario, trial);
+        }
         let order = &trials.order;
         let controller = Controller::new(genome);
         assert_eq!(genome.topology().model(), order.model());
@@ -364,5 +368,32 @@ impl Run<'_> {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::NoiseRate;
+    use crate::torus::Grid;
+    use crate::{Purpose, SeedTree};
+    use minimal_surprise_controller::Topology;
+
+    #[test]
+    fn the_plain_engine_moves_the_plain_world_and_prepares_nothing_of_the_fast_one() {
+        let (seeds, topology) = (SeedTree::new(1), Topology::default());
+        let noise = NoiseRate::new(0.1).unwrap();
+        let scenario = Scenario::new(Grid::new(9, 8).unwrap(), 20, 30, noise).unwrap();
+        let genome = Genome::random(topology, &mut seeds.stream(Purpose::InitialGenome, 0, 0));
+        let trials = TrialSet::new(
+            scenario,
+            topology.model(),
+            vec![scenario.trial(seeds, 0, 0)],
+        );
+        let plain = Evaluator::new(Engine::Plain, Path::best()).motion(&genome, &trials, 0);
+        assert!(trials.flips[0].get().is_none());
+        let fast = Evaluator::new(Engine::Fast, Path::best()).motion(&genome, &trials, 0);
+        assert!(trials.flips[0].get().is_some());
+        assert_eq!(plain, fast);
     }
 }

@@ -28,18 +28,63 @@ const ROWS: [&str; 3] = ["input row", "hidden row", "output row"];
 /// # Errors
 /// [`ExchangeError`] names the first line that is wrong.
 pub fn read_genomes(text: &str) -> Result<Vec<GenomeRows>, ExchangeError> {
-    let mut lines = Lines::of(text);
-    let mut generations = Vec::new();
-    loop {
-        let first = lines.next;
+    generations(text).map(|rows| rows?.numbers()).collect()
+}
+
+/// The generations of an `action_genomes` or a `prediction_genomes` file, at least one: their rows
+/// as text, so that only the numbers that are needed have to be right. Ends after an error.
+pub fn generations(text: &str) -> impl Iterator<Item = Result<RowsOfText<'_>, ExchangeError>> {
+    let (mut lines, mut generation, mut ended) = (Lines::of(text), 0, false);
+    core::iter::from_fn(move || {
+        if ended {
+            return None;
+        }
+        let rows = next_rows(&mut lines, generation);
+        generation += 1;
+        ended = rows.is_err() || !lines.text_follows();
+        Some(rows)
+    })
+}
+
+/// Three rows, and the blank lines after them.
+fn next_rows<'a>(
+    lines: &mut Lines<'a>,
+    generation: usize,
+) -> Result<RowsOfText<'a>, ExchangeError> {
+    let line = lines.next;
+    let mut rows = [""; 3];
+    for (row, name) in rows.iter_mut().zip(ROWS) {
+        let missing = || format!("the {name} of generation {generation}");
+        let (line, text) = lines.required(missing)?;
+        if text.is_empty() {
+            let missing = missing();
+            return Err(Problem::Ended { missing }.at(line));
+        }
+        *row = text;
+    }
+    if lines.text_follows() {
+        let (line, text) = lines.required(String::new)?;
+        return Err(super::unexpected("a blank line after three rows", text).at(line));
+    }
+    lines.skip_blank();
+    Ok(RowsOfText { line, rows })
+}
+
+/// The rows of one generation's network, not read yet.
+#[derive(Clone, Copy, Debug)]
+pub struct RowsOfText<'a> {
+    line: usize,
+    rows: [&'a str; 3],
+}
+
+impl RowsOfText<'_> {
+    /// The numbers in the rows.
+    ///
+    /// # Errors
+    /// [`ExchangeError`] names the first line that is wrong.
+    pub fn numbers(&self) -> Result<GenomeRows, ExchangeError> {
         let mut rows = [const { Vec::new() }; 3];
-        for (row, name) in rows.iter_mut().zip(ROWS) {
-            let missing = || format!("the {name} of generation {}", generations.len());
-            let (line, text) = lines.required(missing)?;
-            if text.is_empty() {
-                let missing = missing();
-                return Err(Problem::Ended { missing }.at(line));
-            }
+        for ((line, text), row) in (self.line..).zip(self.rows).zip(&mut rows) {
             for field in text.split_whitespace() {
                 let value: f64 = number(line, field)?;
                 if !value.is_finite() {
@@ -49,15 +94,8 @@ pub fn read_genomes(text: &str) -> Result<Vec<GenomeRows>, ExchangeError> {
                 row.push(value);
             }
         }
-        generations.push(GenomeRows { line: first, rows });
-        if lines.text_follows() {
-            let (line, text) = lines.required(String::new)?;
-            return Err(super::unexpected("a blank line after three rows", text).at(line));
-        }
-        lines.skip_blank();
-        if !lines.text_follows() {
-            return Ok(generations);
-        }
+        let line = self.line;
+        Ok(GenomeRows { line, rows })
     }
 }
 
@@ -333,6 +371,17 @@ mod tests {
         assert_eq!(to_q3_12(-32767.4 / 4096.0), (-32767, true));
         assert_eq!(to_q3_12(-8.0), (-32767, false));
         assert_eq!(to_q3_12(1e300), (32767, false));
+    }
+
+    #[test]
+    fn a_generation_needs_no_other_to_be_right() {
+        let of = |text| -> Vec<_> { generations(text).collect() };
+        let rows = of("x\n2\n3\n\n4\n5\n6\n\n7\n8\n");
+        assert!(rows[0].as_ref().unwrap().numbers().is_err());
+        let second = rows[1].as_ref().unwrap().numbers().unwrap();
+        assert_eq!((second.line, &second.rows[2][..]), (5, &[6.0][..]));
+        assert_eq!(rows[2].as_ref().unwrap_err().line, 11);
+        assert_eq!(rows.len(), 3);
     }
 
     #[test]

@@ -17,8 +17,8 @@ pub mod trajectory;
 
 pub use agents::{AgentsOfGeneration, read_agents};
 pub use genomes::{
-    GenomeRows, ImportError, ImportedGenome, NetworkName, SaturatedWeight, import_genome,
-    read_genomes,
+    GenomeRows, ImportError, ImportedGenome, NetworkName, RowsOfText, SaturatedWeight, generations,
+    import_genome, read_genomes,
 };
 pub use trajectory::Trajectory;
 

@@ -477,8 +477,10 @@ fn predictions(
                 let robot = triangle((middle_x, middle_y), Heading::North, SIDE / 3);
                 put(area, Polygon::new(robot, OTHER.filled()))?;
                 let cells = group.settings.topology.model().cells();
-                for (sensor, (cell, &average)) in
-                    cells.iter().zip(&run.average_prediction).enumerate()
+                for (sensor, (cell, &average)) in cells
+                    .iter()
+                    .zip(&run.finished.average_prediction)
+                    .enumerate()
                 {
                     let x = middle_x - i32::from(cell.left) * SIDE;
                     let y = middle_y - i32::from(cell.ahead) * SIDE;
@@ -528,7 +530,7 @@ fn temperature((id, title): (String, String), groups: &[&Group]) -> Result<Figur
             .runs
             .iter()
             .filter(|run| is(run))
-            .map(|run| run.temperature.clone())
+            .map(|run| run.finished.temperature.clone())
             .collect(),
         every: 2,
     };
@@ -561,7 +563,7 @@ fn best_fitness((id, title): (String, String), groups: &[&Group]) -> Result<Figu
             runs: group
                 .runs
                 .iter()
-                .map(|run| run.best_fitness.clone())
+                .map(|run| run.finished.best_fitness.clone())
                 .collect(),
             every: 1,
         })

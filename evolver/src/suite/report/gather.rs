@@ -2,19 +2,16 @@
 
 use super::damage_areas::{Rectangle, smallest_apart};
 use super::{ReportError, plural};
-use crate::files::{self, DATA_BYTES_MAX, TEXT_BYTES_MAX};
 use crate::finished_run::{FinishedRun, ReadRunError};
 use crate::reevaluation::{ResilienceRow, after_damage, mean, rerun, resilience};
 use crate::settings::Settings;
 use crate::suite::plan::{Plan, PlannedExperiment, PlannedRun, PlannedSettings, label};
 use crate::suite::search::{Search, look};
 use crate::suite::{Reevaluation, Resilience, Suite};
-use crate::time_spent::TimeSpent;
 use minimal_surprise_controller::Controller;
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::structures::{LineCounts, LineOrientation, Structure, classify};
 use minimal_surprise_sim::{Area, Damage, Pose, SeedTree};
-use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
@@ -23,7 +20,7 @@ use std::path::Path;
 pub struct Run {
     /// Its name.
     pub id: String,
-    /// Genome, start, end, hash.
+    /// Everything in its directory.
     pub finished: FinishedRun,
     /// The structures it is named after, in the paper's order; several if tied, none if no robot
     /// is in any.
@@ -32,27 +29,13 @@ pub struct Run {
     pub shares: [f64; 8],
     /// Its lines.
     pub lines: LineCounts,
-    /// Best fitness of every generation.
-    pub best_fitness: Vec<f64>,
-    /// Movement M.
-    pub movement: f64,
-    /// Intended movement I.
-    pub intended_movement: f64,
-    /// Temperature of every step.
-    pub temperature: Vec<f64>,
-    /// Average prediction of every sensor.
-    pub average_prediction: Vec<f64>,
-    /// Program, version and revision that did it.
-    pub program: String,
-    /// How long it took.
-    pub time: TimeSpent,
 }
 
 impl Run {
     /// Fitness of the last generation's best genome.
     #[must_use]
     pub fn fitness(&self) -> f64 {
-        self.best_fitness.last().copied().unwrap_or(0.0)
+        self.finished.best_fitness.last().copied().unwrap_or(0.0)
     }
 
     /// The structure that it counts for in tests: of tied ones the first in the paper's order.
@@ -344,26 +327,6 @@ impl Gathered {
     }
 }
 
-#[derive(Deserialize)]
-struct FinalFile {
-    average_prediction: Vec<f64>,
-    measures: MeasuresFile,
-}
-
-#[derive(Deserialize)]
-struct MeasuresFile {
-    movement: f64,
-    intended_movement: f64,
-    temperature: Vec<f64>,
-}
-
-#[derive(Deserialize)]
-struct MetaFile {
-    program: String,
-    program_version: String,
-    revision: String,
-}
-
 fn read_group(
     experiment: &str,
     settings: PlannedSettings,
@@ -418,35 +381,14 @@ fn read_run(planned: &PlannedRun, directory: &Path) -> Result<Option<Run>, Repor
         Err(ReadRunError::NotComplete { .. }) => return Ok(None),
         Err(error) => return Err(error.into()),
     };
-    let state: FinalFile = json(&directory.join("final.json"))?;
-    let meta: MetaFile = json(&directory.join("meta.json"))?;
-    // Nothing of what is said depends on it; a run of an older program has none.
-    let time = files::read(&directory.join("time.json"), TEXT_BYTES_MAX).unwrap_or_default();
     let found = classify(finished.settings.scenario.grid(), &finished.final_poses)?;
     Ok(Some(Run {
         id: planned.id.clone(),
         names: found.names(),
         shares: Structure::ALL.map(|structure| found.share(structure)),
         lines: found.line_counts(),
-        best_fitness: finished.best_fitness.clone(),
-        movement: state.measures.movement,
-        intended_movement: state.measures.intended_movement,
-        temperature: state.measures.temperature,
-        average_prediction: state.average_prediction,
-        time: TimeSpent::of_json(&time),
-        program: format!(
-            "{} {}, revision {}",
-            meta.program, meta.program_version, meta.revision
-        ),
         finished,
     }))
-}
-
-fn json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, ReportError> {
-    serde_json::from_slice(&files::read(path, DATA_BYTES_MAX)?).map_err(|error| ReportError::Json {
-        path: path.to_owned(),
-        error,
-    })
 }
 
 fn reevaluate(asked: &Reevaluation, group: &Group) -> Result<Reevaluated, ReportError> {

@@ -45,14 +45,6 @@ pub enum ReportError {
     /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A file of a run is not the JSON that it should be.
-    #[error("{}: {error}", path.display())]
-    Json {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        error: serde_json::Error,
-    },
     /// A final state is not one.
     #[error(transparent)]
     World(#[from] WorldError),
@@ -274,7 +266,7 @@ impl Report {
         let groups = gathered.groups.iter().chain(&gathered.further);
         for run in groups.clone().flat_map(|group| &group.runs) {
             if seen.insert(&run.id) {
-                time = time.and(run.time);
+                time = time.and(run.finished.time);
             } else {
                 shares_runs = true;
             }
@@ -382,13 +374,17 @@ fn p_value(p: f64) -> String {
 }
 
 fn making(group: &Group, called: &str) -> Making {
-    let programs: BTreeSet<&str> = group.runs.iter().map(|run| run.program.as_str()).collect();
+    let programs: BTreeSet<&str> = group
+        .runs
+        .iter()
+        .map(|run| run.finished.program.as_str())
+        .collect();
     let mut hash = Sha256::new();
     for run in &group.runs {
         hash.update(run.finished.hash.as_bytes());
         hash.update(b"\n");
     }
-    let times = group.runs.iter().map(|run| run.time);
+    let times = group.runs.iter().map(|run| run.finished.time);
     let time = times.fold(TimeSpent::default(), TimeSpent::and);
     Making {
         experiment: group.experiment.clone(),
@@ -508,13 +504,13 @@ fn run_rows(gathered: &Gathered) -> Vec<RunRow<'_>> {
                 structures: names.join(";"),
                 share: run.named_share(),
                 fitness: run.fitness(),
-                movement: run.movement,
-                intended_movement: run.intended_movement,
+                movement: run.finished.movement,
+                intended_movement: run.finished.intended_movement,
                 horizontal_lines: run.lines.horizontal,
                 vertical_lines: run.lines.vertical,
                 spanning_lines: run.lines.spanning,
                 hash: &run.finished.hash,
-                program: &run.program,
+                program: &run.finished.program,
             });
         }
     }

@@ -432,14 +432,14 @@ fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table> {
             "movement M",
             3,
             0.0005,
-            |run, _| run.movement,
+            |run, _| run.finished.movement,
             |v| v.movement,
         ),
         (
             "intended movement I",
             3,
             0.0005,
-            |run, _| run.intended_movement,
+            |run, _| run.finished.intended_movement,
             |v| v.intended_movement,
         ),
     ];
@@ -500,7 +500,7 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
             g.values(|run| 100.0 * run.named_share())
         }),
         ("median temperature in the last step", 3, |g| {
-            g.values(|run| run.temperature.last().copied().unwrap_or(0.0))
+            g.values(|run| run.finished.temperature.last().copied().unwrap_or(0.0))
         }),
     ];
     type Counted = fn(&Run) -> bool;
@@ -645,7 +645,7 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
 /// Sensors that the prediction network of a run predicts, on average, more often occupied than not.
 fn sensors_predicted_often(run: &Run) -> usize {
     let predicted = run.finished.settings.topology.predicted();
-    let averages = run.average_prediction.iter().enumerate();
+    let averages = run.finished.average_prediction.iter().enumerate();
     averages
         .filter(|&(sensor, &average)| predicted.get(sensor) && average > 0.5)
         .count()
