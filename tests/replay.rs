@@ -736,6 +736,35 @@ fn a_noisy_run_of_the_first_version_is_checked_by_the_bits_that_it_hashed() {
 }
 
 #[test]
+fn a_damaged_run_or_folder_keeps_no_other_run_out_of_a_gallery() {
+    let evolver = with_a_run();
+    let whole = evolver.read("run/final.json");
+    for copy in ["cut", "loop", "good"] {
+        let from = evolver.folder().join("run");
+        let to = evolver.folder().join(copy);
+        fs::create_dir(&to).unwrap();
+        for file in fs::read_dir(from).unwrap().flatten() {
+            fs::copy(file.path(), to.join(file.file_name())).unwrap();
+        }
+    }
+    evolver.write("cut/final.json", &whole[..300]);
+    let done = evolver.folder().join("loop/DONE");
+    fs::remove_file(&done).unwrap();
+    std::os::unix::fs::symlink("DONE", &done).unwrap();
+    let gallery = evolver.run(&words("gallery . --out g"));
+    assert_eq!(gallery.code, Some(1), "{gallery:?}");
+    for word in ["cut/final.json", "loop/DONE: Too many levels", "2 left out"] {
+        assert!(gallery.stderr.contains(word), "no {word:?}: {gallery:?}");
+    }
+    assert!(gallery.stdout.contains("2 runs"), "{gallery:?}");
+    let pages = evolver.files();
+    let pages = pages
+        .iter()
+        .filter(|f| f.starts_with("g/") && f.ends_with(".html"));
+    assert_eq!(pages.count(), 3);
+}
+
+#[test]
 fn a_trajectory_of_one_state_is_nothing_to_replay() {
     let evolver = with_a_run();
     let exported = evolver.run(&words("export run --format trajectory --out trajectory"));

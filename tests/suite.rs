@@ -555,6 +555,11 @@ fn a_report_goes_where_it_is_asked_for_and_replaces_nothing_but_a_report() {
     assert_eq!(report("said").code, Some(0));
 
     let (ours, kept) = (evolver.read("results/report.html"), b"dear");
+    // A page of ours alone does not make a directory ours.
+    fs::create_dir(evolver.folder().join("saved")).unwrap();
+    evolver.write("saved/report.html", &ours);
+    evolver.write("saved/mother.txt", kept);
+    assert_refused(&report("saved"), &["saved", "--to"]);
     for (folder, file, with_ours) in [
         ("letters", "mother.txt", false),
         ("letters-on-what-was-looked-into", "looked-into.md", false),
@@ -569,6 +574,7 @@ fn a_report_goes_where_it_is_asked_for_and_replaces_nothing_but_a_report() {
         evolver.write(&path, kept);
         if with_ours {
             evolver.write(&format!("{folder}/report.html"), &ours);
+            evolver.write(&format!("{folder}/.evolver-report"), b"");
         }
         if file == "looked-into.md" {
             evolver.write(&format!("{folder}/table-1.csv"), kept);
@@ -584,7 +590,7 @@ fn a_report_goes_where_it_is_asked_for_and_replaces_nothing_but_a_report() {
 #[test]
 fn the_report_of_the_papers_runs_may_be_written_again() {
     let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/results");
-    assert!(report::may_be_written(&results));
+    assert!(report::may_be_written(&results).unwrap());
 }
 
 #[test]
@@ -616,24 +622,101 @@ fn a_damaged_run_is_not_counted_as_done_and_every_command_names_it() {
         } else {
             "no final.json"
         };
-        let words = [what, &format!("delete {run},")];
+        let words = [what, &format!("delete {run}")];
+        let assert_named = |finished: &Finished, words: &[&str]| {
+            assert_eq!(finished.code, Some(1), "{finished:?}");
+            for word in words {
+                assert!(
+                    finished.stderr.contains(word),
+                    "no {word:?} in {finished:?}"
+                );
+            }
+        };
         let status = verb("status");
-        assert_refused(&status, &words);
+        assert_named(&status, &words);
         assert!(
             status.stdout.contains("1 of 2 different runs done"),
             "{status:?}"
         );
         assert!(!status.stdout.contains("hash "), "{status:?}");
-        assert_refused(&verb("run"), &words);
-        assert_refused(&verb("report"), &words);
+        assert_named(&verb("run"), &words);
+        assert_named(&verb("report"), &words);
         let resumed = evolver.run(&["evolve", "--resume", &run]);
         assert_refused(&resumed, &words);
         assert!(!resumed.stdout.contains("complete"), "{resumed:?}");
     }
-    assert!(!evolver.folder().join("suite/report").exists());
     fs::remove_dir_all(evolver.folder().join(&run)).unwrap();
     assert_eq!(verb("run").code, Some(0));
     assert_eq!(hash_by(&evolver, &one), hash);
+}
+
+#[test]
+fn all_damaged_runs_are_named_and_the_others_are_done_shown_and_reported() {
+    let evolver = with_the_suite();
+    assert_eq!(evolver.run(&RUN).code, Some(0));
+    let hashes = evolver.text("suite/hashes.txt");
+    let runs: Vec<String> = hashes
+        .lines()
+        .map(|line| format!("suite/runs/{}", &line[..16]))
+        .collect();
+    // Cut, of other contents, a directory where a file should be, missing; and one not done.
+    let state = evolver.text(&format!("{}/final.json", runs[0]));
+    evolver.write(&format!("{}/final.json", runs[0]), &state.as_bytes()[..300]);
+    evolver.write(&format!("{}/DONE", runs[1]), b"zzz\n");
+    let table = evolver
+        .folder()
+        .join(format!("{}/generations.csv", runs[2]));
+    fs::remove_file(&table).unwrap();
+    fs::create_dir(&table).unwrap();
+    fs::remove_file(evolver.folder().join(format!("{}/best.genome", runs[3]))).unwrap();
+    fs::remove_dir_all(evolver.folder().join(&runs[4])).unwrap();
+    let verb = |verb: &[&str]| {
+        let called = [&["suite", "own.toml"], verb, &["--out", "suite"]].concat();
+        let run = evolver.run(&called);
+        assert_eq!(run.code, Some(1), "{run:?}");
+        for (damaged, problem) in
+            runs.iter()
+                .zip(["final.json", "zzz", "Is a directory", "no best"])
+        {
+            let of_it = |line: &str| line.contains(damaged) && line.contains(problem);
+            assert!(
+                run.stderr.lines().any(of_it),
+                "{damaged}, {problem}: {run:?}"
+            );
+        }
+        let again = format!(
+            "delete {}, then: evolver suite own.toml run",
+            runs[..4].join(" ")
+        );
+        let mut sorted = runs[..4].to_vec();
+        sorted.sort();
+        let again_sorted = again.replace(&runs[..4].join(" "), &sorted.join(" "));
+        assert!(run.stderr.contains("4 left out"), "{run:?}");
+        assert!(run.stderr.contains(&again_sorted), "{run:?}");
+        run.stdout
+    };
+    let status = verb(&["status"]);
+    assert!(status.contains("1 of 6 different runs done"), "{status}");
+    assert!(status.contains("damaged"), "{status}");
+    let report = verb(&["report", "--gallery"]);
+    assert!(report.contains("1 of 6 runs"), "{report}");
+    let text = evolver.text("suite/report/report.md");
+    assert!(
+        text.contains("## Damaged runs") && text.contains("4 runs"),
+        "{text}"
+    );
+    assert!(
+        evolver
+            .folder()
+            .join("suite/report/gallery/index.html")
+            .exists()
+    );
+    let run = verb(&["run"]);
+    assert!(run.contains("2 of 6 runs done"), "{run}");
+    for damaged in &runs[..4] {
+        fs::remove_dir_all(evolver.folder().join(damaged)).unwrap();
+    }
+    assert_eq!(hashes_after(&evolver), hashes);
 }
 
 #[test]

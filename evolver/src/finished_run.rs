@@ -173,12 +173,6 @@ pub enum StateError {
 }
 
 impl ReadRunError {
-    /// Whether there is no complete run, as opposed to one that is damaged or cannot be read.
-    #[must_use]
-    pub fn is_unfinished(&self) -> bool {
-        matches!(self, Self::NotComplete { missing: DONE, .. })
-    }
-
     /// What is wrong, without what to do about it.
     #[must_use]
     pub fn cause(&self) -> &Self {
@@ -428,6 +422,17 @@ impl FinishedRun {
             });
         }
         Ok(finished)
+    }
+
+    /// Reads a run directory, if there is one and its run is complete.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn read_if_complete(path: &Path) -> Result<Option<Self>, ReadRunError> {
+        if !files::exists(&path.join(DONE))? {
+            return Ok(None);
+        }
+        Self::read(path).map(Some)
     }
 
     /// Reads a run directory.

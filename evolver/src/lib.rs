@@ -12,6 +12,7 @@ pub mod bench;
 pub mod checkpoint;
 pub mod cli;
 pub mod commands;
+pub mod damaged_runs;
 pub mod evolution;
 pub mod evolving;
 pub mod exit;

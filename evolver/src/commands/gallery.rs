@@ -1,7 +1,8 @@
 //! `evolver gallery`: all runs at a glance, each a step from its replay.
 
 use super::evaluate::flag;
-use super::{BadInput, thread_pool};
+use super::{BadInput, name_damaged, thread_pool};
+use crate::exit::Exit;
 use crate::files::Existing;
 use crate::replay::gallery::write;
 use crate::settings::count;
@@ -29,7 +30,7 @@ pub struct GalleryArgs {
 ///
 /// # Errors
 /// [`BadInput`] if there is nothing to show, or no place for it.
-pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<()> {
+pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
     let threads = match &arguments.threads {
         Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
         None => None,
@@ -48,5 +49,5 @@ pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<()> {
         written.runs,
         written.bytes as f64 / 1e6
     );
-    Ok(())
+    Ok(name_damaged(&written.damaged, None))
 }

@@ -17,9 +17,11 @@ pub mod pictures;
 pub mod replay;
 pub mod suite;
 
+use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
 use crate::files;
 use crate::output;
+use crate::report::summary::shell_word;
 use crate::robot::PortName;
 use crate::run_dir::RunDirError;
 use crate::settings::count;
@@ -71,6 +73,27 @@ fn stopped(go_on: &str) -> anyhow::Result<Exit> {
         .into()),
         Some(error) => anyhow::bail!("standard output: {error}; go on with: {go_on}"),
     }
+}
+
+/// Names the runs that were left out because they are damaged; `again` is the command that does them
+/// again.
+fn name_damaged(damaged: &DamagedRuns, again: Option<&str>) -> Exit {
+    if damaged.is_empty() {
+        return Exit::Done;
+    }
+    let directories: Vec<String> = damaged.iter().map(|(run, _)| shell_word(run)).collect();
+    for (_, error) in damaged.iter() {
+        tell!("error: {error}");
+    }
+    let again = again.map_or(String::new(), |command| {
+        let directories = directories.join(" ");
+        format!("; to do them again, delete {directories}, then: {command}")
+    });
+    tell!(
+        "{} left out: damaged, made by another version, or not to be read{again}",
+        directories.len()
+    );
+    Exit::Failure
 }
 
 /// The threads to work on; one a core if no number is given.

@@ -1,19 +1,19 @@
 //! `evolver paper` and `evolver suite FILE`: many evolutions, on one machine or many.
 
 use super::evaluate::flag;
-use super::{BadInput, stopped, thread_pool};
+use super::{BadInput, name_damaged, stopped, thread_pool};
+use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
 use crate::files::{self, Existing};
-use crate::finished_run::ReadRunError;
 use crate::replay::gallery;
 use crate::report::progress::ProgressMode;
-use crate::report::suite_progress::{SearchProgress, SuiteProgress};
+use crate::report::suite_progress::{SearchProgress, SuiteProgress, robot_steps};
 use crate::report::summary::shell_word;
 use crate::run_dir::{Found, RunDir, RunDirError};
 use crate::settings::count;
 use crate::signals::stop_on_signal;
 use crate::suite::plan::{Plan, PlannedRun, Runs};
-use crate::suite::report::{self, ReportError};
+use crate::suite::report;
 use crate::suite::search::{Search, look};
 use crate::suite::work::{Progress, Shard, Worked, progress, work_on};
 use crate::suite::{PAPER, Resilience, Suite, slurm};
@@ -232,20 +232,28 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
     match verb {
         Verb::Plan(_) => print_plan(&plan, &read.suite, searches(&read.suite, choice)),
         Verb::Status(_) => {
-            print_status(&plan, &directory)?;
-            print_searches(read, choice, &plan, &directory).map_err(BadInput::new)?;
+            let mut damaged = print_status(&plan, &directory)?;
+            print_searches(read, choice, &plan, &directory, &mut damaged);
+            return Ok(name_damaged(
+                &damaged,
+                Some(&command(read, choice, &directory)),
+            ));
         }
         Verb::Report { to, gallery, .. } => {
             let out = to.clone().unwrap_or_else(|| directory.join("report"));
-            if !report::may_be_written(&out) {
+            if !report::may_be_written(&out)? {
                 return Err(BadInput::new(format!(
-                    "{}: it holds something else than a report; name with --to a new directory, or \
-                     one with a report of this program to replace",
+                    "{}: it is not marked as a report that may be replaced (an earlier version set \
+                     no mark); name a new directory with --to",
                     out.display()
                 ))
                 .into());
             }
-            let finished = finished(plan.runs(), &directory).map_err(BadInput::new)?;
+            let (finished, mut damaged) = finished(plan.runs(), &directory);
+            let again = command(read, choice, &directory);
+            if finished.is_empty() && !damaged.is_empty() {
+                return Ok(name_damaged(&damaged, Some(&again)));
+            }
             if finished.is_empty() {
                 return Err(BadInput::new(format!(
                     "{}: no run of this suite is done there; --out names the directory that its \
@@ -255,19 +263,17 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
                 .into());
             }
             if *gallery {
-                write_gallery(&finished, &out.join(report::GALLERY))?;
+                damaged.extend(write_gallery(&finished, &out.join(report::GALLERY))?);
             }
-            let written = report::write(&plan, &read.suite, &directory, &out, &read.called)
-                .map_err(|error| match error {
-                    ReportError::Run(error) => BadInput::new(error).into(),
-                    other => anyhow::Error::from(other),
-                })?;
+            let written = report::write(&plan, &read.suite, &directory, &out, &read.called)?;
+            damaged.extend(written.damaged);
             show_line!(
                 "{} of {} runs; {}",
                 written.finished,
                 written.planned,
                 written.html.display()
             );
+            return Ok(name_damaged(&damaged, Some(&again)));
         }
         Verb::Run { manner, .. } => {
             return run(&Work {
@@ -316,7 +322,7 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
 }
 
 /// The gallery of a plan's finished runs; an earlier one is replaced.
-fn write_gallery(finished: &[PathBuf], out: &Path) -> anyhow::Result<()> {
+fn write_gallery(finished: &[PathBuf], out: &Path) -> anyhow::Result<DamagedRuns> {
     if let Some(parent) = out.parent() {
         fs::create_dir_all(parent).map_err(files::FileError::at(parent))?;
     }
@@ -327,18 +333,17 @@ fn write_gallery(finished: &[PathBuf], out: &Path) -> anyhow::Result<()> {
         written.bytes as f64 / 1e6,
         written.index.display()
     );
-    Ok(())
+    Ok(written.damaged)
 }
 
-/// The directories of the runs that are done.
-fn finished(runs: Runs<'_>, directory: &Path) -> Result<Vec<PathBuf>, ReadRunError> {
-    let mut finished = Vec::new();
-    for run in runs.iter() {
-        if progress(&run, directory)? == Progress::Done {
-            finished.push(run.directory(directory));
-        }
-    }
-    Ok(finished)
+/// The directories of the runs that are done, and the damaged ones.
+fn finished(runs: Runs<'_>, directory: &Path) -> (Vec<PathBuf>, DamagedRuns) {
+    let mut damaged = DamagedRuns::default();
+    let directories = runs.iter().map(|run| run.directory(directory));
+    let finished = directories
+        .filter(|run| damaged.read(run).is_some())
+        .collect();
+    (finished, damaged)
 }
 
 /// The choice of runs as flags, for tasks.
@@ -436,36 +441,45 @@ fn in_words(number: f64) -> String {
     }
 }
 
-fn print_status(plan: &Plan, directory: &Path) -> Result<(), RunDirError> {
+/// Shows how many runs are done, and gives the damaged ones back.
+fn print_status(plan: &Plan, directory: &Path) -> Result<DamagedRuns, RunDirError> {
+    let mut damaged = DamagedRuns::default();
+    let (runs, mut hash, mut done) = (plan.runs(), Sha256::new(), 0);
+    each_hash(runs, directory, &mut damaged, |line| {
+        hash.update(line);
+        done += 1;
+    })?;
     for experiment in &plan.experiments {
         show_line!("{}", experiment.name);
         for settings in experiment.settings() {
-            let (mut done, mut begun) = (0, 0);
+            let (mut done, mut begun, mut spoilt) = (0, 0, 0);
             for run in settings.runs() {
-                match progress(&run, directory) {
-                    Ok(Progress::Done) => done += 1,
-                    Ok(Progress::Begun) => begun += 1,
-                    Ok(Progress::Pending) | Err(_) => {}
+                if damaged.contains(&run.directory(directory)) {
+                    spoilt += 1;
+                    continue;
+                }
+                match progress(&run, directory)? {
+                    Progress::Done => done += 1,
+                    Progress::Begun => begun += 1,
+                    Progress::Pending => {}
                 }
             }
+            let spoilt = match spoilt {
+                0 => String::new(),
+                number => format!(", {number} damaged"),
+            };
             show_line!(
-                "  {:<40} {done:>4} of {} done, {begun} begun",
+                "  {:<40} {done:>4} of {} done, {begun} begun{spoilt}",
                 settings.label,
                 settings.number
             );
         }
     }
-    let runs = plan.runs();
-    let is_done = |run: &PlannedRun| matches!(progress(run, directory), Ok(Progress::Done));
-    let done = runs.iter().filter(is_done).count() as u64;
     show_line!("\n{done} of {} different runs done", runs.number());
-    // An error if there is a damaged one.
-    let mut hash = Sha256::new();
-    each_hash(runs, directory, |line| hash.update(line))?;
     if done == runs.number() {
         show_line!("hash {}", in_hexadecimal(hash));
     }
-    Ok(())
+    Ok(damaged)
 }
 
 /// The structures that are searched for.
@@ -491,10 +505,11 @@ fn print_searches(
     choice: &Choice,
     plan: &Plan,
     directory: &Path,
-) -> Result<(), ReadRunError> {
+    damaged: &mut DamagedRuns,
+) {
     let command = command(read, choice, directory);
     for asked in searches(&read.suite, choice) {
-        let said = match look(plan, asked, directory, 0)? {
+        let said = match look(plan, asked, directory, 0, damaged) {
             Search::NotNeeded => continue,
             Search::Waits => format!(
                 "waits for the runs that it searches through; then, if none has a {}, on with: \
@@ -516,7 +531,6 @@ fn print_searches(
         };
         show_line!("{}\n  {said}", asked.name);
     }
-    Ok(())
 }
 
 /// Which of the runs.
@@ -560,8 +574,10 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     let runs = shard.of_plan(plan);
     let stop = stop_on_signal()?;
     let pool = thread_pool(threads)?;
+    let mut damaged = DamagedRuns::default();
     let worked = loop {
-        let worked = pool.install(|| do_all(plan, runs, directory, manner.progress, stop))?;
+        let worked =
+            pool.install(|| do_all(plan, runs, directory, manner.progress, stop, &mut damaged))?;
         match worked {
             Some(1..) if stop.load(Ordering::Relaxed) => break None,
             Some(1..) if work.share != Share::Whole => std::thread::sleep(LOOK_AGAIN),
@@ -570,8 +586,9 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     };
     let mut searched = worked.is_some();
     for asked in to_search {
-        searched =
-            searched && pool.install(|| search(plan, asked, directory, manner.progress, stop))?;
+        searched = searched
+            && pool
+                .install(|| search(plan, asked, directory, manner.progress, stop, &mut damaged))?;
     }
     let worked = worked.filter(|_| searched);
     let Some(elsewhere) = worked else {
@@ -580,7 +597,7 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     let mut hash = Sha256::new();
     let mut hashes = Vec::new();
     let mut done = 0;
-    each_hash(runs, directory, |line| {
+    each_hash(runs, directory, &mut damaged, |line| {
         hash.update(line);
         // A part's would take the place of the whole's.
         if work.choice.is_whole() {
@@ -626,7 +643,10 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
             show_line!("for a structure that no run formed, once all are done: {command}");
         }
     }
-    Ok(Exit::Done)
+    Ok(name_damaged(
+        &damaged,
+        Some(&command(work.read, work.choice, directory)),
+    ))
 }
 
 /// The command that searches for a structure, if one may have to be searched for.
@@ -638,13 +658,19 @@ fn search_by(work: &Work) -> Option<String> {
         directory,
         ..
     } = *work;
-    // What cannot be read is in another share, and said by the command.
+    // What is damaged may be in another share, and is said by the command.
     let is_needed = |asked: &Resilience| {
-        let looked = look(plan, asked, directory, 0);
-        matches!(looked, Ok(Search::Waits | Search::Next(..)) | Err(_))
+        let looked = look(plan, asked, directory, 0, &mut DamagedRuns::default());
+        matches!(looked, Search::Waits | Search::Next(..))
     };
     let needed = searches(&read.suite, choice).iter().any(is_needed);
     needed.then(|| command(read, choice, directory))
+}
+
+/// Whether a run is still to be done; a damaged one is not.
+fn waits(run: &PlannedRun, suite: &Path, damaged: &mut DamagedRuns) -> bool {
+    let looked = damaged.take(&run.directory(suite), progress(run, suite));
+    looked.is_some_and(|progress| progress != Progress::Done)
 }
 
 /// Does what is not done; the number of runs that others hold comes back, nothing if interrupted.
@@ -654,15 +680,17 @@ fn do_all(
     directory: &Path,
     mode: ProgressMode,
     stop: &AtomicBool,
+    damaged: &mut DamagedRuns,
 ) -> anyhow::Result<Option<usize>> {
-    let mut waiting = 0;
-    for run in runs.iter() {
-        waiting += u64::from(progress(&run, directory).map_err(BadInput::new)? != Progress::Done);
+    let (mut waiting, mut to_work) = (0, 0_u64);
+    for run in runs.iter().filter(|run| waits(run, directory, damaged)) {
+        waiting += 1;
+        to_work = to_work.saturating_add(robot_steps(&run));
     }
-    let shown = SuiteProgress::start(mode, plan, runs, waiting);
+    let shown = SuiteProgress::start(mode, plan, runs.number(), waiting, to_work);
     let mut elsewhere = 0;
     for run in runs.iter() {
-        if progress(&run, directory).map_err(BadInput::new)? == Progress::Done {
+        if !waits(&run, directory, damaged) {
             continue;
         }
         shown.begins(&run);
@@ -676,6 +704,8 @@ fn do_all(
                 shown.end();
                 return Ok(None);
             }
+            // A disk that is full is not the fault of one run.
+            Err(error) if error.is_bad_input() => damaged.add(&run.directory(directory), error),
             Err(error) => {
                 shown.end();
                 return Err(error.into());
@@ -693,15 +723,17 @@ fn search(
     directory: &Path,
     mode: ProgressMode,
     stop: &AtomicBool,
+    damaged: &mut DamagedRuns,
 ) -> anyhow::Result<bool> {
     let shown = SearchProgress::start(mode, &asked.name);
     let mut after = 0;
     let ended = loop {
-        let Search::Next(run, number) =
-            look(plan, asked, directory, after).map_err(BadInput::new)?
-        else {
+        let Search::Next(run, number) = look(plan, asked, directory, after, damaged) else {
             break true;
         };
+        if damaged.contains(&run.directory(directory)) {
+            break true;
+        }
         shown.begins(&run, number, &asked.name);
         match work_on(&run, directory, stop, |_| {})? {
             Worked::Completed => after = number - 1,
@@ -719,10 +751,11 @@ fn search(
 fn each_hash(
     runs: Runs<'_>,
     directory: &Path,
+    damaged: &mut DamagedRuns,
     mut take: impl FnMut(&str),
 ) -> Result<(), RunDirError> {
     for run in runs.iter() {
-        if progress(&run, directory)? != Progress::Done {
+        if damaged.read(&run.directory(directory)).is_none() {
             continue;
         }
         // Opened, not only read: what a process left that was killed at the very end goes.

@@ -2,9 +2,9 @@
 
 use super::progress::{ProgressMode, Shown, seconds};
 use crate::output::for_stderr;
-use crate::suite::plan::{Plan, PlannedRun, Runs, label};
+use crate::suite::plan::{Plan, PlannedRun, label};
 use indicatif::ProgressBar;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
 /// Shows the progress of the runs of one process.
@@ -15,28 +15,30 @@ pub struct SuiteProgress<'a> {
     plan: &'a Plan,
     runs: u64,
     done_before: u64,
-    /// Runs completed, and robot-steps worked and to be worked, by this process.
+    /// Runs completed, and robot-steps worked, by this process.
     completed: Cell<u64>,
     worked: Cell<u64>,
-    to_work: u64,
+    /// Robot-steps that runs still need.
+    left: Cell<u64>,
+    /// The run that is worked on, and its robot-steps that are not left any more.
+    settled: RefCell<(String, u64)>,
 }
 
 impl<'a> SuiteProgress<'a> {
-    /// Starts the clock: of these runs, so many are not done.
+    /// Starts the clock: of so many runs, some wait and need so many robot-steps.
     #[must_use]
-    pub fn start(mode: ProgressMode, plan: &'a Plan, runs: Runs<'_>, waiting: u64) -> Self {
-        let number = runs.number();
-        let bar = || ProgressBar::new(number).with_position(number - waiting);
-        let steps_of_a_run = runs.iter().next().map_or(0, |run| robot_steps(&run));
+    pub fn start(mode: ProgressMode, plan: &'a Plan, runs: u64, waiting: u64, left: u64) -> Self {
+        let bar = || ProgressBar::new(runs).with_position(runs - waiting);
         Self {
             shown: Shown::new(mode, "{pos}/{len} runs", bar),
             started: Instant::now(),
             plan,
-            runs: number,
-            done_before: number - waiting,
+            runs,
+            done_before: runs - waiting,
             completed: Cell::new(0),
             worked: Cell::new(0),
-            to_work: steps_of_a_run.saturating_mul(waiting),
+            left: Cell::new(left),
+            settled: RefCell::default(),
         }
     }
 
@@ -51,6 +53,7 @@ impl<'a> SuiteProgress<'a> {
     pub fn generation(&self, run: &PlannedRun, generation: u32) {
         self.worked
             .set(self.worked.get() + run.settings.robot_steps_per_generation());
+        self.settle(run, generation);
         match &self.shown {
             Shown::Bar(bar) => bar.set_message(format!(
                 "{}  generation {generation}/{}  {} left",
@@ -75,6 +78,7 @@ impl<'a> SuiteProgress<'a> {
     /// A run is complete.
     pub fn completed(&self, run: &PlannedRun) {
         self.completed.set(self.completed.get() + 1);
+        self.settle(run, run.settings.generations);
         let done = self.done_before + self.completed.get();
         match &self.shown {
             Shown::Bar(bar) => bar.set_position(done),
@@ -111,9 +115,24 @@ impl<'a> SuiteProgress<'a> {
     }
 
     fn left(&self) -> Duration {
-        let worked = self.worked.get().max(1);
-        let left = self.to_work.saturating_sub(worked) as f64 / worked as f64;
-        self.started.elapsed().mul_f64(left)
+        self.started.elapsed().mul_f64(self.share_left())
+    }
+
+    /// What is left, by what this process has worked.
+    fn share_left(&self) -> f64 {
+        self.left.get() as f64 / self.worked.get().max(1) as f64
+    }
+
+    /// Takes the generations of a run from what is left, also those that others have done.
+    fn settle(&self, run: &PlannedRun, generation: u32) {
+        let mut settled = self.settled.borrow_mut();
+        if settled.0 != run.id {
+            *settled = (run.id.clone(), 0);
+        }
+        let (before, now) = (settled.1, until(run, generation));
+        settled.1 = now;
+        let done = now.saturating_sub(before);
+        self.left.set(self.left.get().saturating_sub(done));
     }
 }
 
@@ -169,9 +188,57 @@ impl SearchProgress {
     }
 }
 
-fn robot_steps(run: &PlannedRun) -> u64 {
-    let generations = u64::from(run.settings.generations);
-    run.settings
-        .robot_steps_per_generation()
-        .saturating_mul(generations)
+/// The robot-steps of a whole run.
+#[must_use]
+pub fn robot_steps(run: &PlannedRun) -> u64 {
+    until(run, run.settings.generations)
+}
+
+fn until(run: &PlannedRun, generation: u32) -> u64 {
+    let steps = run.settings.robot_steps_per_generation();
+    steps.saturating_mul(generation.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::suite::Suite;
+    use std::path::Path;
+
+    #[test]
+    fn what_is_left_is_counted_by_what_each_run_costs() {
+        let text = "
+            name = \"own\"
+            [[experiment]]
+            name = \"small-and-large\"
+            runs = 1
+            grids = [\"8x8\"]
+            robots = [10, 40]
+            population = 2
+            generations = 4
+            repetitions = 1
+            steps = 10
+        ";
+        let suite = Suite::parse(Path::new("own.toml"), text).unwrap();
+        let plan = Plan::new(&suite, None, None, false).unwrap();
+        let runs: Vec<_> = plan.runs().iter().collect();
+        let (small, large) = (&runs[0], &runs[1]);
+        let all = runs.iter().map(robot_steps).sum();
+        let shown = SuiteProgress::start(ProgressMode::None, &plan, 2, 2, all);
+        for generation in 1..=4 {
+            shown.generation(small, generation);
+        }
+        shown.completed(small);
+        assert_eq!(
+            shown.share_left(),
+            4.0,
+            "the large one costs four times as much"
+        );
+        // Two of its generations were done before, by another process.
+        shown.generation(large, 3);
+        assert_eq!(shown.share_left(), 0.5);
+        shown.generation(large, 4);
+        shown.completed(large);
+        assert_eq!(shown.share_left(), 0.0);
+    }
 }

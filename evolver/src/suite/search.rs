@@ -6,8 +6,7 @@
 
 use super::Resilience;
 use super::plan::{Plan, PlannedRun};
-use super::work::{Progress, progress};
-use crate::finished_run::{FinishedRun, ReadRunError};
+use crate::damaged_runs::DamagedRuns;
 use minimal_surprise_sim::{Structure, classify};
 use std::path::Path;
 
@@ -27,61 +26,60 @@ pub enum Search {
 }
 
 /// Looks through the files of a suite; of the runs beyond the plan, only those after so many, which
-/// are known not to have the structure.
-///
-/// # Errors
-/// [`ReadRunError`] if a finished run cannot be read.
+/// are known not to have the structure. A damaged run is not done.
 pub fn look(
     plan: &Plan,
     asked: &Resilience,
     suite: &Path,
     after: u32,
-) -> Result<Search, ReadRunError> {
+    damaged: &mut DamagedRuns,
+) -> Search {
     let experiment = plan.experiments.iter().find(|e| e.name == asked.of);
     let (Some(experiment), Some(structure), 1..) =
         (experiment, asked.structure(), asked.further_runs)
     else {
-        return Ok(Search::NotNeeded);
+        return Search::NotNeeded;
     };
     let mut waits = false;
     for settings in experiment.settings().filter(|_| after == 0) {
         for run in settings.runs() {
-            match has(&run, structure, suite)? {
-                Some(true) => return Ok(Search::NotNeeded),
+            match has(&run, structure, suite, damaged) {
+                Some(true) => return Search::NotNeeded,
                 Some(false) => {}
                 None => waits = true,
             }
         }
     }
     if waits {
-        return Ok(Search::Waits);
+        return Search::Waits;
     }
     let further = (1..=asked.further_runs).zip(experiment.further());
     for (number, run) in further.skip(after as usize) {
-        match has(&run, structure, suite)? {
-            Some(true) => return Ok(Search::Found(Box::new(run), number)),
+        match has(&run, structure, suite, damaged) {
+            Some(true) => return Search::Found(Box::new(run), number),
             Some(false) => {}
-            None => return Ok(Search::Next(Box::new(run), number)),
+            None => return Search::Next(Box::new(run), number),
         }
     }
-    Ok(Search::InVain(asked.further_runs))
+    Search::InVain(asked.further_runs)
 }
 
 /// Whether a run is named after a structure; none if it is not done.
-fn has(run: &PlannedRun, structure: Structure, suite: &Path) -> Result<Option<bool>, ReadRunError> {
-    if progress(run, suite)? != Progress::Done {
-        return Ok(None);
-    }
-    let finished = FinishedRun::read(&run.directory(suite))?;
+fn has(
+    run: &PlannedRun,
+    structure: Structure,
+    suite: &Path,
+    damaged: &mut DamagedRuns,
+) -> Option<bool> {
+    let finished = damaged.read(&run.directory(suite))?;
     let found = classify(run.settings.scenario.grid(), &finished.final_poses);
-    Ok(Some(
-        found.is_ok_and(|found| found.names().contains(&structure)),
-    ))
+    Some(found.is_ok_and(|found| found.names().contains(&structure)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::finished_run::FinishedRun;
     use crate::suite::work::{Worked, work_on};
     use crate::suite::{Suite, plan::PlannedRun};
     use std::collections::BTreeSet;
@@ -108,6 +106,10 @@ mod tests {
         let suite = Suite::parse(Path::new("own.toml"), &text).unwrap();
         let plan = Plan::new(&suite, None, None, false).unwrap();
         (suite, plan)
+    }
+
+    fn looked(plan: &Plan, asked: &Resilience, directory: &Path, after: u32) -> Search {
+        look(plan, asked, directory, after, &mut DamagedRuns::default())
     }
 
     fn done(run: &PlannedRun, directory: &Path) {
@@ -157,24 +159,21 @@ mod tests {
         let directory = scratch.path().join("searched");
         let (asking, plan) = suite(wanted.name(), number);
         let asked = &asking.resiliences[0];
-        assert!(matches!(
-            look(&plan, asked, &directory, 0).unwrap(),
-            Search::Waits
-        ));
+        assert!(matches!(looked(&plan, asked, &directory, 0), Search::Waits));
         plan.runs().iter().for_each(|run| done(&run, &directory));
         for expected in 1..=number {
-            match look(&plan, asked, &directory, expected - 1).unwrap() {
+            match looked(&plan, asked, &directory, expected - 1) {
                 Search::Next(run, next) if next == expected => done(&run, &directory),
                 other => panic!("run {expected} beyond the plan is next, not {other:?}"),
             }
         }
-        match look(&plan, asked, &directory, 0).unwrap() {
+        match looked(&plan, asked, &directory, 0) {
             Search::Found(run, taken) => assert_eq!((run.id, taken), (found.id, number)),
             other => panic!("{wanted} is in run {number} beyond the plan, not {other:?}"),
         }
         if number > 1 {
             let (less, plan) = suite(wanted.name(), number - 1);
-            let looked = look(&plan, &less.resiliences[0], &directory, 0).unwrap();
+            let looked = looked(&plan, &less.resiliences[0], &directory, 0);
             assert!(matches!(looked, Search::InVain(n) if n == number - 1));
         }
         let (_, plan) = suite(wanted.name(), 0);
@@ -182,7 +181,7 @@ mod tests {
             further_runs: 0,
             ..asked.clone()
         };
-        let looked = look(&plan, &none, &directory, 0).unwrap();
+        let looked = looked(&plan, &none, &directory, 0);
         assert!(matches!(looked, Search::NotNeeded), "none was asked for");
     }
 }

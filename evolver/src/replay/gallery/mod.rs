@@ -8,6 +8,7 @@ use super::page::{self, PageError, encoding, prediction_name};
 use super::palette;
 use super::recording::Recording;
 use super::scene::{Colouring, Ink, Scene};
+use crate::damaged_runs::DamagedRuns;
 use crate::files::{self, Existing, FileError};
 use crate::finished_run::{FinishedRun, ReadRunError};
 use crate::new_dir::{NewDir, remove_abandoned};
@@ -17,10 +18,13 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// The first page of a gallery.
 pub const INDEX: &str = "index.html";
+/// Says that a folder holds a gallery.
+const MARKER: &str = ".evolver-gallery";
 /// How many folders deep runs are looked for.
 const DEPTH: usize = 3;
 
@@ -49,6 +53,9 @@ pub enum GalleryError {
     /// There is nothing to show.
     #[error("no complete run in {}", list(.0))]
     Empty(Vec<PathBuf>),
+    /// Every run is damaged.
+    #[error("{}", causes(.0))]
+    Damaged(DamagedRuns),
     /// There is something already.
     #[error("{} exists; name another folder, or replace its pages with --overwrite", .0.display())]
     Exists(PathBuf),
@@ -66,6 +73,8 @@ pub struct Written {
     pub runs: usize,
     /// Run directories left out because their runs have not ended.
     pub unfinished: usize,
+    /// Runs left out because they are damaged, and folders that cannot be looked into.
+    pub damaged: DamagedRuns,
     /// Size of all its pages.
     pub bytes: u64,
 }
@@ -87,18 +96,22 @@ pub fn write(
     }
     let found = Found::in_all(directories)?;
     if found.runs.is_empty() {
-        return Err(GalleryError::Empty(directories.to_vec()));
+        return Err(if found.damaged.is_empty() {
+            GalleryError::Empty(directories.to_vec())
+        } else {
+            GalleryError::Damaged(found.damaged)
+        });
     }
-    let into_existing = || Ok(found.written(out, found.write(out)?));
+    let into_existing = || found.write(out, out);
     if exists() {
         return into_existing();
     }
     remove_abandoned(files::parent(out));
     let write = || {
         let new = NewDir::beside(out)?;
-        let bytes = found.write(new.path())?;
+        let written = found.write(new.path(), out)?;
         new.publish()?;
-        Ok(found.written(out, bytes))
+        Ok(written)
     };
     match write() {
         // Another process has made it meanwhile.
@@ -118,6 +131,7 @@ struct Found {
     unfinished: usize,
     seen: BTreeSet<PathBuf>,
     names: BTreeSet<String>,
+    damaged: DamagedRuns,
 }
 
 impl Found {
@@ -125,7 +139,7 @@ impl Found {
         let mut found = Self::default();
         found.names.insert(INDEX.to_owned());
         for directory in directories {
-            if is_run(directory) {
+            if holds_run(directory)?.is_some() {
                 found.add(directory)?;
             } else {
                 found.look_in(directory, DEPTH)?;
@@ -134,7 +148,7 @@ impl Found {
         Ok(found)
     }
 
-    fn look_in(&mut self, directory: &Path, depth: usize) -> Result<(), GalleryError> {
+    fn look_in(&mut self, directory: &Path, depth: usize) -> Result<(), FileError> {
         let at = || FileError::at(directory);
         let mut inside = Vec::new();
         for entry in fs::read_dir(directory).map_err(at())? {
@@ -146,18 +160,24 @@ impl Found {
         }
         inside.sort();
         for path in inside.iter().filter(|path| path.is_dir()) {
-            if path.join("DONE").is_file() {
-                self.add(path)?;
-            } else if is_run(path) {
-                self.unfinished += 1;
-            } else if depth > 1 {
-                self.look_in(path, depth - 1)?;
+            let looked = match holds_run(path) {
+                Ok(Some(Progress::Complete)) => self.add(path),
+                Ok(Some(Progress::Begun)) => {
+                    self.unfinished += 1;
+                    Ok(())
+                }
+                Ok(None) if depth > 1 => self.look_in(path, depth - 1),
+                Ok(None) => Ok(()),
+                Err(error) => Err(error),
+            };
+            if let Err(error) = looked {
+                self.damaged.add(path, error);
             }
         }
         Ok(())
     }
 
-    fn add(&mut self, run: &Path) -> Result<(), GalleryError> {
+    fn add(&mut self, run: &Path) -> Result<(), FileError> {
         let whole = run.canonicalize().map_err(FileError::at(run))?;
         if self.seen.insert(whole.clone()) {
             let name = whole.file_name().unwrap_or_default().to_string_lossy();
@@ -168,8 +188,8 @@ impl Found {
         Ok(())
     }
 
-    /// Writes all pages, the first one last.
-    fn write(&self, folder: &Path) -> Result<u64, GalleryError> {
+    /// Writes all pages, the first one last; `out` is where they will be.
+    fn write(&self, folder: &Path, out: &Path) -> Result<Written, GalleryError> {
         let cards = self.runs.par_iter().map(|(run, name)| {
             let recording = read(run)?;
             let text =
@@ -182,26 +202,64 @@ impl Found {
             files::replace(&folder.join(name), text.as_bytes())?;
             Ok(Card::of(&recording, name, text.len()))
         });
-        let cards = cards.collect::<Result<Vec<_>, GalleryError>>()?;
+        let made: Vec<Result<Card, GalleryError>> = cards.collect();
+        let (mut cards, mut damaged) = (Vec::new(), self.damaged.clone());
+        for (card, (run, _)) in made.into_iter().zip(&self.runs) {
+            match card {
+                Ok(card) => cards.push(card),
+                Err(error @ GalleryError::File(_)) => return Err(error),
+                Err(error) => damaged.add(run, error),
+            }
+        }
+        if cards.is_empty() {
+            return Err(GalleryError::Damaged(damaged));
+        }
+        files::replace(&folder.join(MARKER), b"A gallery of evolver.\n")?;
         let index = index(&cards);
         files::replace(&folder.join(INDEX), index.as_bytes())?;
         let pages: usize = cards.iter().map(|card| card.bytes).sum();
-        Ok((pages + index.len()) as u64)
-    }
-
-    fn written(&self, out: &Path, bytes: u64) -> Written {
-        Written {
+        Ok(Written {
             index: out.join(INDEX),
-            runs: self.runs.len(),
+            runs: cards.len(),
             unfinished: self.unfinished,
-            bytes,
-        }
+            damaged,
+            bytes: (pages + index.len()) as u64,
+        })
     }
 }
 
-/// Whether a directory is that of a run, complete or not.
-fn is_run(path: &Path) -> bool {
-    path.join("DONE").is_file() || path.join("config.toml").is_file()
+/// Whether a folder is marked as that of a gallery.
+///
+/// # Errors
+/// [`FileError`] if it cannot be looked into.
+pub fn is_marked(folder: &Path) -> Result<bool, FileError> {
+    match files::exists(&folder.join(MARKER)) {
+        // A file is in its place.
+        Err(error) if error.error.kind() == ErrorKind::NotADirectory => Ok(false),
+        marked => marked,
+    }
+}
+
+/// How far a run is.
+enum Progress {
+    Begun,
+    Complete,
+}
+
+/// Whether a directory is that of a run.
+fn holds_run(path: &Path) -> Result<Option<Progress>, FileError> {
+    Ok(if files::exists(&path.join("DONE"))? {
+        Some(Progress::Complete)
+    } else if files::exists(&path.join("config.toml"))? {
+        Some(Progress::Begun)
+    } else {
+        None
+    })
+}
+
+fn causes(damaged: &DamagedRuns) -> String {
+    let causes: Vec<&str> = damaged.iter().map(|(_, cause)| cause).collect();
+    causes.join("\n")
 }
 
 /// A name of a file that no link has to escape, different from those that are taken.

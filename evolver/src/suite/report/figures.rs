@@ -22,6 +22,8 @@ use serde::Serialize;
 pub struct Figure {
     /// Name of its files.
     pub id: String,
+    /// Its number in the paper, if it is one of the paper's.
+    pub number: Option<u32>,
     /// What it shows.
     pub title: String,
     /// The picture.
@@ -115,20 +117,25 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
         if groups.is_empty() {
             continue;
         }
-        let name = |number: u32, what: &str| {
+        let name = |number: u32, id: &str, what: &str| {
             if is_paper {
-                (format!("figure-{number}"), format!("Fig. {number}: {what}"))
+                Name {
+                    id: format!("figure-{number}"),
+                    number: Some(number),
+                    title: format!("Fig. {number}: {what}"),
+                }
             } else {
-                let what_id = what.split(' ').next().unwrap_or_default().to_lowercase();
-                (
-                    format!("{experiment}-{what_id}"),
-                    format!("{experiment}: {what}"),
-                )
+                Name {
+                    id: format!("{experiment}-{id}"),
+                    number: None,
+                    title: format!("{experiment}: {what}"),
+                }
             }
         };
         figures.push(temperature(
             name(
                 5,
+                "temperature",
                 "Temperature over time: box plots at every even step, drawn as \
                  bands; extremes light, quartiles dark, medians red",
             ),
@@ -137,12 +144,13 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
         figures.push(best_fitness(
             name(
                 6,
+                "best",
                 "Best fitness over generations; medians red, bands of quartiles and extremes grey",
             ),
             &groups,
         )?);
         figures.push(predictions(
-            name(9, "Predictions of the robot's surroundings, averaged over robots and steps, a run of each structure; the robot heads up"),
+            name(9, "predictions", "Predictions of the robot's surroundings, averaged over robots and steps, a run of each structure; the robot heads up"),
             &groups,
             gathered,
         )?);
@@ -153,11 +161,14 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
             if let Some(group) = group.filter(|group| !group.runs.is_empty()) {
                 let grid = &group.settings.written.grid;
                 figures.push(final_states(
-                    format!("figure-{}-{grid}", of.figure),
-                    format!(
-                        "Fig. {}: final states on {grid}, {}",
-                        of.figure, of.experiment
-                    ),
+                    Name {
+                        id: format!("figure-{}-{grid}", of.figure),
+                        number: Some(of.figure),
+                        title: format!(
+                            "Fig. {}: final states on {grid}, {}",
+                            of.figure, of.experiment
+                        ),
+                    },
                     (group, of.by),
                     gathered,
                 )?);
@@ -166,17 +177,17 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
     } else {
         for (index, group) in gathered.groups.iter().enumerate() {
             if !group.runs.is_empty() {
-                let id = format!("{}-states-{}", group.experiment, index + 1);
-                let title = format!("{}, {}: final states", group.experiment, group.label);
-                figures.push(final_states(id, title, (group, By::Structure), gathered)?);
+                let name = Name {
+                    id: format!("{}-states-{}", group.experiment, index + 1),
+                    number: None,
+                    title: format!("{}, {}: final states", group.experiment, group.label),
+                };
+                figures.push(final_states(name, (group, By::Structure), gathered)?);
             }
         }
     }
-    // In the paper's order.
-    figures.sort_by_key(|figure| {
-        let number = figure.id.split('-').nth(1).and_then(|n| n.parse().ok());
-        number.unwrap_or(u32::MAX)
-    });
+    // In the paper's order; those that it does not have stay in the suite's.
+    figures.sort_by_key(|figure| figure.number.unwrap_or(u32::MAX));
     let numbers = ["Fig. 13: ", "Fig. 14: "];
     for (index, resilient) in gathered.resiliences.iter().enumerate() {
         let prefix = if is_paper {
@@ -192,12 +203,31 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
 /// Marks a run beyond the plan.
 const BEYOND_PLAN: &str = "†";
 
-/// A title that says what the mark means, if it is there.
-fn explained(title: String, has_mark: bool) -> String {
-    if has_mark {
-        format!("{title}; {BEYOND_PLAN} a run beyond the plan")
-    } else {
-        title
+/// What a figure is called.
+struct Name {
+    id: String,
+    number: Option<u32>,
+    title: String,
+}
+
+impl Name {
+    /// With what the mark means, if it is there.
+    fn explained(mut self, has_mark: bool) -> Self {
+        if has_mark {
+            self.title += &format!("; {BEYOND_PLAN} a run beyond the plan");
+        }
+        self
+    }
+
+    fn figure(self, svg: String, csv: String) -> Figure {
+        let Self { id, number, title } = self;
+        Figure {
+            id,
+            number,
+            title,
+            svg,
+            csv,
+        }
     }
 }
 
@@ -261,8 +291,7 @@ struct State<'a> {
 }
 
 fn final_states(
-    id: String,
-    title: String,
+    name: Name,
     (group, by): (&Group, By),
     gathered: &Gathered,
 ) -> Result<Figure, FigureError> {
@@ -286,9 +315,9 @@ fn final_states(
             area: None,
         })
         .collect();
-    let title = explained(title, has_mark);
-    let title = format!("{title}; robots in the structure are blue");
-    draw_states(id, title, &states, 3)
+    let name = name.explained(has_mark);
+    let title = format!("{}; robots in the structure are blue", name.title);
+    draw_states(Name { title, ..name }, &states, 3)
 }
 
 fn damage(prefix: &str, resilient: &Resilient) -> Result<Option<Figure>, FigureError> {
@@ -317,8 +346,12 @@ fn damage(prefix: &str, resilient: &Resilient) -> Result<Option<Figure>, FigureE
         plural(damaged.areas.len(), "area"),
         resilient.structure
     );
-    let id = resilient.asked.name.clone();
-    draw_states(id, title, &states, damaged.areas.len()).map(Some)
+    let name = Name {
+        id: resilient.asked.name.clone(),
+        number: None,
+        title,
+    };
+    draw_states(name, &states, damaged.areas.len()).map(Some)
 }
 
 const CELL: i32 = 12;
@@ -334,12 +367,7 @@ struct RobotRow<'a> {
     in_structure: u8,
 }
 
-fn draw_states(
-    id: String,
-    title: String,
-    states: &[State<'_>],
-    columns: usize,
-) -> Result<Figure, FigureError> {
+fn draw_states(name: Name, states: &[State<'_>], columns: usize) -> Result<Figure, FigureError> {
     let mut rows = Vec::new();
     let side = |cells: u16| i32::from(cells) * CELL;
     let panel_width = states
@@ -361,7 +389,7 @@ fn draw_states(
         panel_width * columns as i32 + GAP,
         panel_height * lines as i32,
     );
-    let svg = draw(&id, size, |area| {
+    let svg = draw(&name.id, size, |area| {
         for (index, state) in states.iter().enumerate() {
             let west = GAP / 2 + panel_width * (index % columns) as i32;
             let top = panel_height * (index / columns) as i32 + GAP;
@@ -403,13 +431,7 @@ fn draw_states(
         }
         Ok(())
     })?;
-    let csv = csv_of(&rows);
-    Ok(Figure {
-        id,
-        title,
-        svg,
-        csv,
-    })
+    Ok(name.figure(svg, csv_of(&rows)))
 }
 
 /// A robot's triangle, its tip ahead.
@@ -434,43 +456,37 @@ struct PredictionRow<'a> {
     average_prediction: f64,
 }
 
-fn predictions(
-    (id, title): (String, String),
-    groups: &[&Group],
-    gathered: &Gathered,
-) -> Result<Figure, FigureError> {
+fn predictions(name: Name, groups: &[&Group], gathered: &Gathered) -> Result<Figure, FigureError> {
     const SIDE: i32 = 40;
     const PANEL: i32 = 250;
-    let shown: Vec<(String, &Group, &Run)> =
-        groups
-            .iter()
-            .flat_map(|group| {
-                let grid = &group.settings.written.grid;
-                let planned = one_of_each(group, By::Structure).into_iter();
-                let further = beyond_plan(gathered, group).into_iter();
-                planned
-                    .map(|(name, _, run)| (format!("{grid}: {name}"), *group, run))
-                    .chain(further.map(|(name, _, run)| {
-                        (format!("{grid}: {name}{BEYOND_PLAN}"), *group, run)
-                    }))
-                    .collect::<Vec<_>>()
-            })
-            .collect();
-    let has_mark = shown.iter().any(|(name, ..)| name.ends_with(BEYOND_PLAN));
-    let title = explained(title, has_mark);
+    let shown: Vec<(bool, String, &Group, &Run)> = groups
+        .iter()
+        .flat_map(|group| {
+            let grid = &group.settings.written.grid;
+            let planned = one_of_each(group, By::Structure).into_iter();
+            let further = beyond_plan(gathered, group).into_iter();
+            planned
+                .map(|(name, _, run)| (false, format!("{grid}: {name}"), *group, run))
+                .chain(further.map(|(name, _, run)| {
+                    (true, format!("{grid}: {name}{BEYOND_PLAN}"), *group, run)
+                }))
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    let name = name.explained(shown.iter().any(|(is_beyond_plan, ..)| *is_beyond_plan));
     let mut rows = Vec::new();
     let columns = shown.len().clamp(1, 4) as i32;
     let lines = (shown.len() as i32 + columns - 1) / columns;
     let svg = draw(
-        &id,
+        &name.id,
         (PANEL * columns, (PANEL + GAP) * lines.max(1)),
         |area| {
-            for (index, (name, group, run)) in shown.iter().enumerate() {
+            for (index, (_, shown, group, run)) in shown.iter().enumerate() {
                 let middle_x = PANEL * (index as i32 % columns) + PANEL / 2;
                 let middle_y = (PANEL + GAP) * (index as i32 / columns) + GAP + PANEL / 2;
                 text(
                     area,
-                    name,
+                    shown,
                     (middle_x - 3 * SIDE + 20, middle_y - PANEL / 2 - 12),
                     14,
                 )?;
@@ -493,7 +509,7 @@ fn predictions(
                     put(area, Rectangle::new(corners, OTHER.stroke_width(1)))?;
                     text(area, &format!("{average:.2}"), (x - 13, y - 7), 13)?;
                     rows.push(PredictionRow {
-                        state: name,
+                        state: shown,
                         sensor,
                         ahead: cell.ahead,
                         left: cell.left,
@@ -504,13 +520,7 @@ fn predictions(
             Ok(())
         },
     )?;
-    let csv = csv_of(&rows);
-    Ok(Figure {
-        id,
-        title,
-        svg,
-        csv,
-    })
+    Ok(name.figure(svg, csv_of(&rows)))
 }
 
 /// Runs whose values are shown together over time.
@@ -522,7 +532,7 @@ struct Panel {
     every: usize,
 }
 
-fn temperature((id, title): (String, String), groups: &[&Group]) -> Result<Figure, FigureError> {
+fn temperature(name: Name, groups: &[&Group]) -> Result<Figure, FigureError> {
     let mut panels = Vec::new();
     let panel = |title: String, group: &Group, is: &dyn Fn(&Run) -> bool| Panel {
         title,
@@ -552,10 +562,10 @@ fn temperature((id, title): (String, String), groups: &[&Group]) -> Result<Figur
             }));
         }
     }
-    bands(id, title, ("time step", "temperature"), &panels)
+    bands(name, ("time step", "temperature"), &panels)
 }
 
-fn best_fitness((id, title): (String, String), groups: &[&Group]) -> Result<Figure, FigureError> {
+fn best_fitness(name: Name, groups: &[&Group]) -> Result<Figure, FigureError> {
     let panels: Vec<Panel> = groups
         .iter()
         .map(|group| Panel {
@@ -568,7 +578,7 @@ fn best_fitness((id, title): (String, String), groups: &[&Group]) -> Result<Figu
             every: 1,
         })
         .collect();
-    bands(id, title, ("generation", "best fitness"), &panels)
+    bands(name, ("generation", "best fitness"), &panels)
 }
 
 #[derive(Serialize)]
@@ -585,8 +595,7 @@ struct BandRow<'a> {
 
 /// Medians with bands from quartile to quartile and from the least to the largest value.
 fn bands(
-    id: String,
-    title: String,
+    name: Name,
     (x_name, y_name): (&str, &str),
     panels: &[Panel],
 ) -> Result<Figure, FigureError> {
@@ -607,7 +616,7 @@ fn bands(
     };
     let mut rows = Vec::new();
     let size = (WIDTH * columns as i32, HEIGHT * lines as i32);
-    let svg = draw(&id, size, |root| {
+    let svg = draw(&name.id, size, |root| {
         for (area, panel) in root.split_evenly((lines, columns)).iter().zip(panels) {
             let length = panel.runs.iter().map(Vec::len).max().unwrap_or(0);
             let mut chart = ChartBuilder::on(area)
@@ -670,13 +679,7 @@ fn bands(
         }
         Ok(())
     })?;
-    let csv = csv_of(&rows);
-    Ok(Figure {
-        id,
-        title,
-        svg,
-        csv,
-    })
+    Ok(name.figure(svg, csv_of(&rows)))
 }
 
 type Paper<'a> = DrawingArea<SVGBackend<'a>, Shift>;

@@ -2,7 +2,8 @@
 
 use super::damage_areas::{Rectangle, smallest_apart};
 use super::{ReportError, plural};
-use crate::finished_run::{FinishedRun, ReadRunError};
+use crate::damaged_runs::DamagedRuns;
+use crate::finished_run::FinishedRun;
 use crate::reevaluation::{ResilienceRow, after_damage, mean, rerun, resilience};
 use crate::settings::Settings;
 use crate::suite::plan::{Plan, PlannedExperiment, PlannedRun, PlannedSettings, label};
@@ -65,6 +66,8 @@ pub struct Group {
     pub experiment: String,
     /// What distinguishes the settings.
     pub label: String,
+    /// Whether its runs are beyond the plan.
+    pub is_beyond_plan: bool,
     /// The settings, with the first seed.
     pub settings: Settings,
     /// Runs that are planned.
@@ -78,6 +81,17 @@ impl Group {
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.runs.len() == self.planned
+    }
+
+    /// Its settings, in words.
+    #[must_use]
+    pub fn setting(&self) -> String {
+        let beyond = if self.is_beyond_plan {
+            ", beyond the plan"
+        } else {
+            ""
+        };
+        format!("{}{beyond}", self.label)
     }
 
     /// How many of its runs are finished, in words.
@@ -245,9 +259,6 @@ pub struct Resilient {
     pub overall: Overall,
 }
 
-/// What is said of the setting of runs beyond the plan.
-const BEYOND_PLAN: &str = ", beyond the plan";
-
 /// Everything that a report is about.
 #[derive(Clone, Debug)]
 pub struct Gathered {
@@ -259,18 +270,25 @@ pub struct Gathered {
     pub reevaluations: Vec<Reevaluated>,
     /// The resilience experiments.
     pub resiliences: Vec<Resilient>,
+    /// Runs that are left out.
+    pub damaged: DamagedRuns,
 }
 
 impl Gathered {
     /// Reads the finished runs of a plan and makes of them what the suite asks for.
     ///
     /// # Errors
-    /// [`ReportError`] if a finished run cannot be read.
+    /// [`ReportError`] if a finished run cannot be run again.
     pub fn read(plan: &Plan, suite: &Suite, directory: &Path) -> Result<Self, ReportError> {
-        let mut groups = Vec::new();
+        let (mut groups, mut damaged) = (Vec::new(), DamagedRuns::default());
         for experiment in &plan.experiments {
             for settings in experiment.settings() {
-                groups.push(read_group(&experiment.name, settings, directory)?);
+                groups.push(read_group(
+                    &experiment.name,
+                    settings,
+                    directory,
+                    &mut damaged,
+                )?);
             }
         }
         let mut reevaluations = Vec::new();
@@ -283,7 +301,7 @@ impl Gathered {
         let mut resiliences: Vec<Resilient> = Vec::new();
         for asked in &suite.resiliences {
             if plan.experiments.iter().any(|e| e.name == asked.of) {
-                resiliences.push(damage(asked, &groups, plan, directory)?);
+                resiliences.push(damage(asked, &groups, plan, directory, &mut damaged)?);
             }
         }
         let mut further = Vec::new();
@@ -291,13 +309,19 @@ impl Gathered {
             // Two searches through the same experiment share its runs.
             let searched = resiliences.iter().filter(|r| r.asked.of == experiment.name);
             let number = searched.map(|r| r.further).max().unwrap_or(0);
-            further.extend(read_further(experiment, number as usize, directory)?);
+            further.extend(read_further(
+                experiment,
+                number as usize,
+                directory,
+                &mut damaged,
+            )?);
         }
         Ok(Self {
             groups,
             further,
             reevaluations,
             resiliences,
+            damaged,
         })
     }
 
@@ -313,8 +337,7 @@ impl Gathered {
     #[must_use]
     pub fn further_of(&self, group: &Group) -> Option<&Group> {
         self.further.iter().find(|further| {
-            further.experiment == group.experiment
-                && further.label.strip_suffix(BEYOND_PLAN) == Some(&group.label)
+            (&further.experiment, &further.label) == (&group.experiment, &group.label)
         })
     }
 
@@ -331,14 +354,16 @@ fn read_group(
     experiment: &str,
     settings: PlannedSettings,
     directory: &Path,
+    damaged: &mut DamagedRuns,
 ) -> Result<Group, ReportError> {
     let mut runs = Vec::new();
     for planned in settings.runs() {
-        runs.extend(read_run(&planned, &planned.directory(directory))?);
+        runs.extend(read_run(&planned, &planned.directory(directory), damaged)?);
     }
     Ok(Group {
         experiment: experiment.to_owned(),
         label: settings.label,
+        is_beyond_plan: false,
         settings: settings.settings,
         planned: settings.number as usize,
         runs,
@@ -350,13 +375,14 @@ fn read_further(
     experiment: &PlannedExperiment,
     number: usize,
     directory: &Path,
+    damaged: &mut DamagedRuns,
 ) -> Result<Vec<Group>, ReportError> {
     let mut groups: Vec<Group> = Vec::new();
     for planned in experiment.further().take(number) {
-        let Some(run) = read_run(&planned, &planned.directory(directory))? else {
+        let Some(run) = read_run(&planned, &planned.directory(directory), damaged)? else {
             continue;
         };
-        let label = label(&planned.settings) + BEYOND_PLAN;
+        let label = label(&planned.settings);
         match groups.iter_mut().find(|group| group.label == label) {
             Some(group) => {
                 group.planned += 1;
@@ -365,6 +391,7 @@ fn read_further(
             None => groups.push(Group {
                 experiment: experiment.name.clone(),
                 label,
+                is_beyond_plan: true,
                 settings: planned.settings.clone(),
                 planned: 1,
                 runs: vec![run],
@@ -374,12 +401,14 @@ fn read_further(
     Ok(groups)
 }
 
-/// A run; none if it is not finished.
-fn read_run(planned: &PlannedRun, directory: &Path) -> Result<Option<Run>, ReportError> {
-    let finished = match FinishedRun::read(directory) {
-        Ok(finished) => finished,
-        Err(ReadRunError::NotComplete { .. }) => return Ok(None),
-        Err(error) => return Err(error.into()),
+/// A run; none if it is not finished, or damaged.
+fn read_run(
+    planned: &PlannedRun,
+    directory: &Path,
+    damaged: &mut DamagedRuns,
+) -> Result<Option<Run>, ReportError> {
+    let Some(finished) = damaged.read(directory) else {
+        return Ok(None);
     };
     let found = classify(finished.settings.scenario.grid(), &finished.final_poses)?;
     Ok(Some(Run {
@@ -462,6 +491,7 @@ fn damage(
     groups: &[Group],
     plan: &Plan,
     directory: &Path,
+    damaged_runs: &mut DamagedRuns,
 ) -> Result<Resilient, ReportError> {
     let structure = asked
         .structure()
@@ -490,9 +520,9 @@ fn damage(
     });
     let (damaged, further) = match chosen {
         Some((group, run)) => (Some(damage_run(asked, structure, &group.label, run)?), 0),
-        None => match look(plan, asked, directory, 0)? {
+        None => match look(plan, asked, directory, 0, damaged_runs) {
             Search::Found(found, further) => {
-                let run = read_run(&found, &found.directory(directory))?;
+                let run = read_run(&found, &found.directory(directory), damaged_runs)?;
                 let label = label(&found.settings);
                 let damaged = run.map(|run| damage_run(asked, structure, &label, &run));
                 (damaged.transpose()?, further)

@@ -22,8 +22,8 @@ figure { margin: 2em 0; overflow-x: auto; } figcaption { color: var(--soft); fon
 svg { max-width: 100%; height: auto; } code { font-size: .9em; overflow-wrap: anywhere; }
 ";
 
-/// What says that a page is a report of this program.
-pub(super) const MARK: &str = "<meta name=\"generator\" content=\"minimal-surprise-evolver\">";
+/// Says which program made the page.
+const MARK: &str = "<meta name=\"generator\" content=\"minimal-surprise-evolver\">";
 
 /// Said before the findings.
 pub(super) const VERDICTS: &str = "*Holds* and *differs* say whether the statement, as worded, is \
@@ -95,6 +95,15 @@ pub(super) fn to_look_at(report: &Report) -> String {
 /// What comes first: what is missing, and where we differ.
 pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
     let mut opening = Vec::new();
+    if !report.damaged.is_empty() {
+        let runs: Vec<String> = report.damaged.iter().map(|id| format!("`{id}`")).collect();
+        let line = format!(
+            "Damaged, or not to be read, and left out of everything below: {}, {}.",
+            plural(runs.len(), "run"),
+            runs.join(", ")
+        );
+        opening.push(("Damaged runs", vec![line]));
+    }
     if !report.missing.is_empty() {
         let mut lines = vec![
             "Not all runs are finished; everything below is of those that are.".to_owned(),

@@ -17,8 +17,9 @@ pub mod tables;
 
 use super::Suite;
 use super::plan::Plan;
+use crate::damaged_runs::DamagedRuns;
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
-use crate::finished_run::ReadRunError;
+use crate::replay::gallery;
 use crate::report::progress::seconds;
 use crate::time_spent::TimeSpent;
 use figures::{Figure, FigureError};
@@ -29,6 +30,7 @@ use paper::PaperValues;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tables::{Table, Value};
@@ -39,9 +41,6 @@ const LOOKED_INTO: &str = "looked-into.md";
 /// A report cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// A finished run cannot be read.
-    #[error(transparent)]
-    Run(#[from] ReadRunError),
     /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -75,6 +74,8 @@ pub struct Written {
     pub finished: usize,
     /// Runs that are planned.
     pub planned: usize,
+    /// Runs that are left out.
+    pub damaged: DamagedRuns,
 }
 
 /// How the runs of a setting were made, the evolved ones or those that were run again.
@@ -121,6 +122,8 @@ pub struct Report {
     pub suite: String,
     /// Experiments that lack runs, in words.
     pub missing: Vec<String>,
+    /// Names of damaged runs, which are left out.
+    pub damaged: Vec<String>,
     /// The findings.
     pub findings: Vec<Finding>,
     /// Where tests speak against our numbers and the paper's being the same, in words.
@@ -150,7 +153,7 @@ pub struct Report {
 #[derive(Serialize)]
 struct RunRow<'a> {
     experiment: &'a str,
-    setting: &'a str,
+    setting: String,
     id: &'a str,
     seed: u64,
     structures: String,
@@ -168,30 +171,33 @@ struct RunRow<'a> {
 /// Where a report links to, in its directory, if there is a gallery of its runs.
 pub const GALLERY: &str = "gallery";
 
-/// What every gallery's first page has in it, and nothing else is likely to.
-const GALLERY_MARK: &str = "<h1 class=\"grow\">Gallery</h1>";
+/// Says that a directory holds a report, which another may replace.
+const MARKER: &str = ".evolver-report";
 
-/// Whether a report would replace nothing but a report: the directory is new, or empty but for what
-/// is to be said in the report and what an earlier one left that was cut short, or its `report.html`
-/// is one of ours. A gallery in it must be one of ours, too.
-#[must_use]
-pub fn may_be_written(out: &Path) -> bool {
-    let Ok(entries) = std::fs::read_dir(out) else {
-        return out.symlink_metadata().is_err();
-    };
-    let has = |name: &str, mark: &str| {
-        let text = std::fs::read(out.join(name)).unwrap_or_default();
-        String::from_utf8_lossy(&text).contains(mark)
+/// Whether a report would replace nothing but a report: the directory is new, marked as that of a
+/// report, or empty but for what is to be said in the report. A gallery in it must be marked, too.
+///
+/// # Errors
+/// [`FileError`] if it cannot be looked into.
+pub fn may_be_written(out: &Path) -> Result<bool, FileError> {
+    let entries = match std::fs::read_dir(out) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(true),
+        entries => entries.map_err(FileError::at(out))?,
     };
     let gallery = out.join(GALLERY);
-    if gallery.symlink_metadata().is_ok() && !has(&format!("{GALLERY}/index.html"), GALLERY_MARK) {
-        return false;
+    if files::exists(&gallery)? && !gallery::is_marked(&gallery)? {
+        return Ok(false);
     }
-    has("report.html", html::MARK)
-        || entries.flatten().all(|entry| {
-            let name = entry.file_name();
-            name == LOOKED_INTO || name == GALLERY || files::is_part(&name)
-        })
+    if files::exists(&out.join(MARKER))? {
+        return Ok(true);
+    }
+    for entry in entries {
+        let name = entry.map_err(FileError::at(out))?.file_name();
+        if name != LOOKED_INTO && name != GALLERY && !files::is_part(&name) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// Writes the report of a plan's finished runs, with the data of its tables and figures as CSV.
@@ -200,7 +206,7 @@ pub fn may_be_written(out: &Path) -> bool {
 /// `looked-into.md`, its text comes after the differences: paragraphs, and list items with a dash.
 ///
 /// # Errors
-/// [`ReportError`] if a finished run cannot be read or a file cannot be written.
+/// [`ReportError`] if a file cannot be written.
 pub fn write(
     plan: &Plan,
     suite: &Suite,
@@ -210,9 +216,9 @@ pub fn write(
 ) -> Result<Written, ReportError> {
     let gathered = Gathered::read(plan, suite, directory)?;
     let mut report = Report::of(&gathered, &suite.name, called)?;
-    report.has_gallery = out.join(GALLERY).join("index.html").is_file();
+    report.has_gallery = files::exists(&out.join(GALLERY).join(gallery::INDEX))?;
     let looked_into = out.join(LOOKED_INTO);
-    if looked_into.is_file() {
+    if files::exists(&looked_into)? {
         let text = files::read(&looked_into, TEXT_BYTES_MAX)?;
         let text = String::from_utf8_lossy(&text);
         report.looked_into = text.lines().map(str::to_owned).collect();
@@ -233,6 +239,10 @@ pub fn write(
         files.push((format!("{}.csv", figure.id), figure.csv.clone()));
     }
     std::fs::create_dir_all(out).map_err(FileError::at(out))?;
+    files::replace(
+        &out.join(MARKER),
+        b"A report of evolver; another may replace it.\n",
+    )?;
     let mut written = Vec::new();
     for (name, contents) in files {
         let path = out.join(name);
@@ -245,6 +255,7 @@ pub fn write(
         files: written,
         finished: gathered.groups.iter().map(|group| group.runs.len()).sum(),
         planned: gathered.groups.iter().map(|group| group.planned).sum(),
+        damaged: gathered.damaged,
     })
 }
 
@@ -279,6 +290,11 @@ impl Report {
             shares_runs,
             time,
             missing: missing.collect(),
+            damaged: gathered
+                .damaged
+                .iter()
+                .filter_map(|(run, _)| Some(run.file_name()?.to_string_lossy().into_owned()))
+                .collect(),
             findings: findings::all(gathered, &paper),
             differences: differences(&tests),
             tests: tests.len(),
@@ -388,7 +404,7 @@ fn making(group: &Group, called: &str) -> Making {
     let time = times.fold(TimeSpent::default(), TimeSpent::and);
     Making {
         experiment: group.experiment.clone(),
-        setting: group.label.clone(),
+        setting: group.setting(),
         finished: group.runs.len(),
         planned: group.planned,
         seeds: seeds(&group.runs),
@@ -498,7 +514,7 @@ fn run_rows(gathered: &Gathered) -> Vec<RunRow<'_>> {
             let names: Vec<&str> = run.names.iter().map(|name| name.name()).collect();
             rows.push(RunRow {
                 experiment: &group.experiment,
-                setting: &group.label,
+                setting: group.setting(),
                 id: &run.id,
                 seed: run.finished.settings.seed,
                 structures: names.join(";"),
@@ -636,6 +652,40 @@ mod tests {
         }
         let made = std::fs::read_to_string(out.join("how-made.csv")).unwrap();
         assert!(made.contains("beyond the plan\",2,2,2 to 3,"), "{made}");
+    }
+
+    #[test]
+    fn figures_stay_in_the_order_of_the_suite_whatever_their_names() {
+        let experiment = |name: &str| {
+            format!(
+                "[[experiment]]\nname = \"{name}\"\nruns = 1\ngrids = [\"8x8\"]\nrobots = [12]\n\
+                 population = 4\ngenerations = 2\nrepetitions = 1\nsteps = 20\n"
+            )
+        };
+        let text = format!(
+            "name = \"own\"\n{}{}",
+            experiment("one-9"),
+            experiment("two-1")
+        );
+        let scratch = tempfile::tempdir().unwrap();
+        let suite = Suite::parse(Path::new("own.toml"), &text).unwrap();
+        let plan = Plan::new(&suite, None, None, false).unwrap();
+        for run in plan.runs().iter() {
+            let worked = work_on(&run, scratch.path(), &AtomicBool::new(false), |_| {});
+            assert_eq!(worked.unwrap(), Worked::Completed);
+        }
+        let out = scratch.path().join("report");
+        write(&plan, &suite, scratch.path(), &out, "evolver").unwrap();
+        let markdown = std::fs::read_to_string(out.join("report.md")).unwrap();
+        let figures: Vec<usize> = [
+            "one-9-temperature",
+            "one-9-best",
+            "two-1-temperature",
+            "two-1-best",
+        ]
+        .map(|id| markdown.find(&format!("({id}.svg)")).expect(id))
+        .to_vec();
+        assert!(figures.is_sorted(), "{figures:?}");
     }
 
     /// The numbers of a table's CSV by setting and column.

@@ -218,7 +218,7 @@ fn structure_tables(
         let title =
             format!("{experiment}: percentage of runs by the structure they are named after");
         let categories = structure_order(&shared);
-        let table = share_table(id, source, title, &shared, &categories);
+        let table = share_table(id, source, title, Counted::TiedRuns, &shared, &categories);
         (!categories.is_empty()).then_some(table)
     });
     tables.collect()
@@ -267,10 +267,43 @@ fn structure_order(shared: &[Shared<'_>]) -> Vec<String> {
     order
 }
 
+/// What the percentages of a table are of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Counted {
+    /// Runs, which structures share.
+    TiedRuns,
+    /// Runs, and genomes by most of their new starts.
+    RunsAndGenomes,
+    /// New starts, which structures share.
+    TiedStarts,
+}
+
+impl Counted {
+    fn note(self) -> &'static str {
+        match self {
+            Self::TiedRuns => {
+                "Percent with Wilson's 95 % interval; a run tied between k structures counts 1/k \
+                 for each."
+            }
+            Self::RunsAndGenomes => {
+                "Percent with Wilson's 95 % interval. From new starts a genome counts for what \
+                 more than half of them give, else as diverse."
+            }
+            Self::TiedStarts => {
+                "Percent of all starts of all genomes; one tied between k structures counts 1/k \
+                 for each. The starts of a genome are not independent, so that there is no \
+                 interval; that of the fitness is the bootstrap 95 % interval of the median of the \
+                 genomes' mean fitnesses."
+            }
+        }
+    }
+}
+
 fn share_table(
     id: String,
     source: String,
     title: String,
+    counted: Counted,
     shared: &[Shared<'_>],
     categories: &[String],
 ) -> Table {
@@ -290,17 +323,16 @@ fn share_table(
         }
     });
     let mut columns = categories.to_vec();
-    let mut notes = vec![
-        "Percent with Wilson's 95 % interval; a run tied between k structures counts 1/k for each."
-            .to_owned(),
-    ];
+    let mut notes = vec![counted.note().to_owned()];
     if tested {
         columns.push("all together".to_owned());
-        notes.push(
-            "All together: test of both distributions; there a tied run counts for the structure \
-             that comes first in the paper's Sec. 2.2."
-                .to_owned(),
-        );
+        if counted == Counted::TiedRuns {
+            notes.push(
+                "All together: test of both distributions; there a tied run counts for the \
+                 structure that comes first in the paper's Sec. 2.2."
+                    .to_owned(),
+            );
+        }
     }
     notes.extend(shared.iter().filter_map(groupings_together));
     notes.extend(
@@ -491,6 +523,33 @@ fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table> {
     })
 }
 
+/// What a share of runs is of.
+#[derive(Clone, Copy)]
+enum Among {
+    LineRuns,
+    AllRuns,
+}
+
+impl Among {
+    fn has(self, run: &Run) -> bool {
+        match self {
+            Self::LineRuns => run.names.contains(&Structure::Line),
+            Self::AllRuns => true,
+        }
+    }
+
+    /// How many of the paper's runs these are.
+    fn of_paper(self, shares: &Distribution) -> u32 {
+        match self {
+            Self::LineRuns => {
+                let lines = shares.percent(Structure::Line.name()) / 100.0;
+                (lines * f64::from(shares.runs)).round() as u32
+            }
+            Self::AllRuns => shares.runs,
+        }
+    }
+}
+
 /// Numbers that the paper gives in its text, and the median best fitness of every setting.
 fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<Table> {
     type Values = fn(&Group) -> Vec<f64>;
@@ -503,11 +562,9 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
             g.values(|run| run.finished.temperature.last().copied().unwrap_or(0.0))
         }),
     ];
-    type Counted = fn(&Run) -> bool;
-    let line_runs: Counted = |run| run.names.contains(&Structure::Line);
-    let shares: [(&str, Counted); 2] = [
-        ("line runs with lines around the torus, %", line_runs),
-        ("runs with lines around the torus, %", |_| true),
+    let shares = [
+        ("line runs with lines around the torus, %", Among::LineRuns),
+        ("runs with lines around the torus, %", Among::AllRuns),
     ];
     let wanted = |measure: &str| {
         measure == MEDIAN_BEST_FITNESS
@@ -540,10 +597,10 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
             row.values.push(Some(value));
         }
     }
-    for (measure, counted) in shares.into_iter().filter(|(m, _)| wanted(m)) {
+    for (measure, among) in shares.into_iter().filter(|(m, _)| wanted(m)) {
         columns.push(measure.to_owned());
         for (row, group) in rows.iter_mut().zip(groups) {
-            let runs: Vec<&Run> = group.runs.iter().filter(|run| counted(run)).collect();
+            let runs: Vec<&Run> = group.runs.iter().filter(|run| among.has(run)).collect();
             let spanning = runs.iter().filter(|run| run.lines.spanning > 0).count();
             let of = runs.len();
             let mut value = Value {
@@ -560,18 +617,11 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
                 if let Some(shares) = shares
                     && of > 0
                 {
-                    // The paper's runs that the share is of: its line runs, or all.
-                    let lines = shares.percent(Structure::Line.name()) / 100.0;
-                    let runs = f64::from(shares.runs);
-                    let among = if measure.starts_with("line") {
-                        (lines * runs).round()
-                    } else {
-                        runs
-                    };
-                    let theirs = (number.value / 100.0 * among).round() as u32;
+                    let of_theirs = among.of_paper(shares);
+                    let theirs = (number.value / 100.0 * f64::from(of_theirs)).round() as u32;
                     value = value.tested(fisher(
                         &[spanning as u32, (of - spanning) as u32],
-                        &[theirs, among as u32 - theirs],
+                        &[theirs, of_theirs - theirs],
                     ));
                 }
             }
@@ -717,12 +767,8 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
     };
     let title =
         "Percentage of runs, and of genomes from new starts, by the way their lines go".to_owned();
-    let mut table = share_table(id, source, title, &shared, &categories);
-    table.notes[0] =
-        "Percent with Wilson's 95 % interval. From new starts a genome counts for what \
-                      more than half of them give, else as diverse."
-            .to_owned();
-    table.notes.retain(|note| !note.starts_with("All together"));
+    let counted = Counted::RunsAndGenomes;
+    let mut table = share_table(id, source, title, counted, &shared, &categories);
     let done = |reevaluated: &&Reevaluated| !reevaluated.genomes.is_empty();
     for reevaluated in gathered.reevaluations.iter().filter(done) {
         let all: Vec<&[Structure]> = reevaluated
@@ -782,13 +828,8 @@ fn new_starts(gathered: &Gathered) -> Option<Table> {
     let categories = structure_order(&shared);
     let id = "new-starts".to_owned();
     let title = "Percentage of new starts by the structure that they end in".to_owned();
-    let mut table = share_table(id, String::new(), title, &shared, &categories);
-    table.notes = vec![
-        "Percent of all starts of all genomes; one tied between k structures counts 1/k for each. \
-         The starts of a genome are not independent, so that there is no interval; that of the \
-         fitness is the bootstrap 95 % interval of the median of the genomes' mean fitnesses."
-            .to_owned(),
-    ];
+    let counted = Counted::TiedStarts;
+    let mut table = share_table(id, String::new(), title, counted, &shared, &categories);
     table.columns.insert(0, "median fitness".to_owned());
     for ((row, shared), reevaluated) in table.rows.iter_mut().zip(&shared).zip(&done) {
         for value in row.values.iter_mut().flatten() {

@@ -1,0 +1,52 @@
+//! Damaged runs of a suite or a gallery: they are named together at the end, and the others are done,
+//! shown and reported.
+
+use crate::finished_run::{FinishedRun, ReadRunError};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// What is wrong with runs, by their directories.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DamagedRuns(BTreeMap<PathBuf, String>);
+
+impl DamagedRuns {
+    /// Reads a run; none if it is not complete, or damaged, which is then known here.
+    pub fn read(&mut self, run: &Path) -> Option<FinishedRun> {
+        self.take(run, FinishedRun::read_if_complete(run)).flatten()
+    }
+
+    /// What was read of a run, if that went well.
+    pub fn take<T>(&mut self, run: &Path, read: Result<T, ReadRunError>) -> Option<T> {
+        read.map_err(|error| self.add(run, error.cause())).ok()
+    }
+
+    /// Adds a run.
+    pub fn add(&mut self, run: &Path, error: impl fmt::Display) {
+        self.0.insert(run.to_owned(), error.to_string());
+    }
+
+    /// Adds the runs of another list.
+    pub fn extend(&mut self, other: Self) {
+        self.0.extend(other.0);
+    }
+
+    /// Whether a run is among them.
+    #[must_use]
+    pub fn contains(&self, run: &Path) -> bool {
+        self.0.contains_key(run)
+    }
+
+    /// The directories, and what is wrong.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = (&Path, &str)> {
+        self.0
+            .iter()
+            .map(|(path, error)| (path.as_path(), error.as_str()))
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
