@@ -406,7 +406,7 @@ fn the_gallery_sorts_filters_and_opens_replays_by_the_keyboard() {
     assert!(
         files
             .iter()
-            .filter(|name| name.starts_with("gallery/"))
+            .filter(|name| name.starts_with("gallery/") && name.ends_with(".html"))
             .eq(&pages)
     );
 

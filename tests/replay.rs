@@ -549,7 +549,11 @@ fn numbers_that_cannot_be_are_refused_in_every_file_of_a_run() {
         ("final.json", state("/average_prediction", "[]"), "sensors"),
         ("final.json", state("/repetition", "2"), "repetition"),
         ("final.json", state("/repetition", "-1"), "line 1"),
-        ("final.json", state("/steps_hash", "\"zzz\""), "64 digits"),
+        (
+            "final.json",
+            state("/steps_hash_v2", "\"zzz\""),
+            "64 digits",
+        ),
         ("final.json", state("/hash", "\"zzz\""), "64 digits"),
         ("time.json", time("-1"), "seconds"),
         ("time.json", time("1e300"), "seconds"),
