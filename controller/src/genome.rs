@@ -186,8 +186,9 @@ fn uniform_within<R: Rng>(rng: &mut R, max: i16) -> i16 {
 mod tests {
     extern crate std;
     use super::*;
+    use core::convert::Infallible;
     use rand_chacha::ChaCha8Rng;
-    use rand_core::SeedableRng;
+    use rand_core::{SeedableRng, TryRng};
     use std::vec::Vec;
 
     fn rng() -> ChaCha8Rng {
@@ -266,6 +267,99 @@ mod tests {
         assert_eq!(MutationRate::ratio(2, 1), None);
         assert_eq!(MutationRate::ratio(0, 0), None);
         assert_eq!(MutationRate::from_per_2_32((1 << 32) + 1), None);
+    }
+
+    /// Gives these words, in order.
+    struct Script<I>(I);
+
+    impl<I: Iterator<Item = u32>> TryRng for Script<I> {
+        type Error = Infallible;
+
+        fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+            Ok(self.0.next().expect("no word is left"))
+        }
+
+        fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+            unreachable!("weights take words of 32 bits")
+        }
+
+        fn try_fill_bytes(&mut self, _: &mut [u8]) -> Result<(), Infallible> {
+            unreachable!("weights take words of 32 bits")
+        }
+    }
+
+    #[test]
+    fn every_value_has_as_many_words_and_the_others_are_rejected() {
+        // 2³² words for 3 values: one is too many, and it is the first.
+        let draw = |words: &[u32]| {
+            let mut script = Script(words.iter().copied());
+            let value = uniform_within(&mut script, 1);
+            assert_eq!(script.0.next(), None, "words are left");
+            value
+        };
+        assert_eq!(draw(&[0, 1]), -1);
+        assert_eq!(draw(&[1]), -1);
+        assert_eq!(draw(&[0x5555_5555]), -1);
+        assert_eq!(draw(&[0x5555_5556]), 0);
+        assert_eq!(draw(&[0xaaaa_aaaa]), 0);
+        assert_eq!(draw(&[0xaaaa_aaab]), 1);
+        assert_eq!(draw(&[u32::MAX]), 1);
+
+        // 2³² is 256 modulo 4097: words are rejected whose product with 4097 ends in less. The
+        // factor is the inverse of 4097 modulo 2³².
+        let of_4097 = |low: u32| low.wrapping_mul(0x00ff_f001);
+        for low in [0, 1, 255] {
+            assert_eq!(of_4097(low).wrapping_mul(4097), low);
+            let mut script = Script([of_4097(low), u32::MAX].into_iter());
+            assert_eq!(uniform_within(&mut script, 2048), 2048, "{low}");
+        }
+        for low in [256, 257, u32::MAX] {
+            let mut script = Script([of_4097(low), u32::MAX].into_iter());
+            uniform_within(&mut script, 2048);
+            assert_eq!(script.0.next(), Some(u32::MAX), "{low} is taken");
+        }
+    }
+
+    #[test]
+    fn a_weight_mutates_on_words_below_the_rate() {
+        let topology = Topology::default();
+        let rate = MutationRate::from_per_2_32(1000).unwrap();
+        // The first weight mutates, by the largest addend; the others do not.
+        let words = [999, u32::MAX].into_iter().chain([1000; 615]);
+        let mut genome = Genome::zeroed(topology);
+        genome.mutate(rate, &mut Script(words));
+        assert_eq!(genome.weights()[0], MUTATION_MAX_Q3_12);
+        assert!(genome.weights()[1..].iter().all(|&weight| weight == 0));
+    }
+
+    #[test]
+    fn rates_are_rounded_down_to_multiples_of_2_to_the_minus_32() {
+        for (numerator, denominator, per_2_32) in [
+            (0, 1, 0),
+            (1, 10, 429_496_729),
+            (2, 3, 2_863_311_530),
+            (1, u32::MAX, 1),
+            (u32::MAX, u32::MAX, 1 << 32),
+        ] {
+            assert_eq!(
+                MutationRate::ratio(numerator, denominator),
+                MutationRate::from_per_2_32(per_2_32),
+                "{numerator} / {denominator}"
+            );
+        }
+        assert_eq!(MutationRate::from_per_2_32(u64::MAX), None);
+    }
+
+    #[test]
+    fn a_genome_is_the_weights_of_its_networks_one_after_the_other() {
+        for topology in Topology::ALL {
+            let genome = Genome::random(topology, &mut rng());
+            let (action, prediction) = genome.weights().split_at(topology.action_weights());
+            assert_eq!(genome.topology(), topology);
+            assert_eq!(genome.action_weights(), action);
+            assert_eq!(genome.prediction_weights(), prediction);
+            assert_eq!(prediction.len(), topology.prediction_weights());
+        }
     }
 
     #[test]

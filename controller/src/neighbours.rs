@@ -246,6 +246,19 @@ mod tests {
     }
 
     #[test]
+    fn of_neighbours_equally_far_the_one_detected_first_is_kept() {
+        let mut neighbours = Neighbours::<1>::new();
+        for bearing_rad in [1.0, 2.0] {
+            neighbours.push(Detection {
+                range_mm: 100.0,
+                bearing_rad,
+            });
+        }
+        assert_eq!(neighbours.detections()[0].bearing_rad, 1.0);
+        assert_eq!(neighbours.dropped(), 1);
+    }
+
+    #[test]
     fn a_list_without_room_drops_everything() {
         let mut neighbours = Neighbours::<0>::new();
         neighbours.push(Detection {

@@ -143,6 +143,21 @@ mod tests {
     }
 
     #[test]
+    fn sensors_are_the_bits_of_a_word_and_none_beyond() {
+        for bit in 0..16 {
+            let bits = SensorBits::new(1 << bit);
+            for index in 0..20 {
+                assert_eq!(bits.get(index), index == bit);
+                assert!(!SensorBits::NONE.get(index));
+            }
+            assert!(!bits.get(usize::MAX));
+            assert_eq!(bits.differing(SensorBits::NONE), 1);
+            assert_eq!(bits.differing(SensorBits::new(u16::MAX)), 15);
+            assert_eq!(bits.differing(bits), 0);
+        }
+    }
+
+    #[test]
     fn models_have_8_6_and_14_sensors() {
         assert_eq!(SensorModel::ALL.map(SensorModel::sensors), [8, 6, 14]);
         assert_eq!(

@@ -288,6 +288,51 @@ mod tests {
     }
 
     #[test]
+    fn templates_have_the_names_that_files_use() {
+        assert_eq!(
+            Template::ALL.map(Template::name),
+            ["line", "pair", "square", "triangular-lattice"]
+        );
+    }
+
+    #[test]
+    fn templates_predict_the_cells_of_their_structures() {
+        for (template, model) in Template::ALL
+            .into_iter()
+            .flat_map(|template| SensorModel::ALL.map(|model| (template, model)))
+        {
+            let c_only = matches!(template, Template::Square | Template::TriangularLattice);
+            let expected = (!c_only || model == SensorModel::C).then(|| {
+                let cells = model.cells().iter().enumerate();
+                let bits = cells.map(|(sensor, cell)| {
+                    let (ahead, left) = (cell.ahead, cell.left);
+                    let occupied = match template {
+                        Template::Line => left == 0,
+                        Template::Pair => (ahead, left) == (1, 0),
+                        Template::Square => ahead.abs() == 2 && left == 0,
+                        Template::TriangularLattice => {
+                            ahead.abs() == 2 && left == 0 || ahead.abs() == 1 && left.abs() == 1
+                        }
+                    };
+                    u16::from(occupied) << sensor
+                });
+                SensorBits::new(bits.sum())
+            });
+            assert_eq!(template.bits(model), expected, "{template:?}, {model:?}");
+            if let Some(bits) = expected {
+                let topology = Topology::new(model, Prediction::Predefined(template)).unwrap();
+                assert_eq!(topology.fixed(), bits);
+                assert_eq!(topology.predicted(), SensorBits::NONE);
+            }
+        }
+        for model in SensorModel::ALL {
+            let topology = Topology::new(model, Prediction::Free).unwrap();
+            assert_eq!(topology.fixed(), SensorBits::NONE);
+            assert_eq!(topology.predicted(), model.mask());
+        }
+    }
+
+    #[test]
     fn networks_have_the_papers_sizes() {
         let sizes = |model, prediction| {
             let topology = Topology::new(model, prediction).unwrap();

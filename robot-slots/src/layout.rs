@@ -158,6 +158,11 @@ mod tests {
     }
 
     #[test]
+    fn a_slot_made_outside_the_robot_leaves_sixteen_million_updates() {
+        assert_eq!(u32::MAX - MADE_WRITE_COUNT_MAX, 16_777_216);
+    }
+
+    #[test]
     fn slots_are_whole_erase_units() {
         assert_eq!(
             [1, 256, 4096, 128 << 10].map(slot_bytes),

@@ -6,12 +6,12 @@
 //! every second cut after each; otherwise some of those. `POWER_CUT=write_size:erase_size:first:second`
 //! makes one pair of cuts; a failure prints it.
 
-use embedded_storage::nor_flash::NorFlash;
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, Provenance, encode};
 use minimal_surprise_controller::{EncodedGenome, Genome, Topology};
 use minimal_surprise_slots::{
-    Buffer, COMMIT_AT, CONTAINER_AT, Defect, InPlace, InUse, PlaceError, Slot, SlotState, Slots,
-    UpdateError, crc_of, slot_bytes,
+    Buffer, COMMIT_AT, CONTAINER_AT, Defect, Header, InPlace, InUse, PlaceError, Slot, SlotState,
+    Slots, UpdateError, crc_of, slot_bytes,
 };
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
@@ -408,6 +408,132 @@ fn of_two_damaged_genomes_the_older_one_is_replaced() {
 }
 
 #[test]
+fn of_two_genomes_with_one_count_that_of_the_first_slot_is_used() {
+    type Flash = MockFlash<4, 4096>;
+    let room = &mut Buffer::new();
+    let mut flash = Flash::new();
+    let genomes = old_and_new();
+    for (slot, genome) in Slot::ALL.into_iter().zip(&genomes) {
+        let header = Header {
+            write_count: 7,
+            length: genome.len() as u16,
+            crc: crc_of(genome).unwrap(),
+        };
+        let at = Flash::OFFSET + u32::from(slot.index()) * slot_bytes(4096) as u32;
+        flash.write(at, &header.front()).unwrap();
+        let mut words = genome.clone();
+        words.resize(genome.len().next_multiple_of(4), 0xff);
+        flash.write(at + CONTAINER_AT, &words).unwrap();
+    }
+    let mut slots = Slots::open(flash, Flash::OFFSET, room).unwrap();
+    assert_eq!(slots.newest().map(|(slot, _)| slot), Some(Slot::First));
+    assert_eq!(slots.write(&genomes[1], room), Ok(8));
+    assert_eq!(slots.newest().map(|(slot, _)| slot), Some(Slot::Second));
+}
+
+/// A chip that treats one of its writes like this.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Treatment {
+    /// Reports success, and has written nothing.
+    Forgets,
+    /// Has written everything, and reports an error.
+    Misreports,
+}
+
+struct Unreliable {
+    flash: MockFlash<4, 256>,
+    /// Writes to come before the one that is not carried out well.
+    writes_before: usize,
+    treatment: Treatment,
+}
+
+impl ErrorType for Unreliable {
+    type Error = PowerCut;
+}
+
+impl ReadNorFlash for Unreliable {
+    const READ_SIZE: usize = 4;
+
+    fn read(&mut self, at: u32, bytes: &mut [u8]) -> Result<(), PowerCut> {
+        self.flash.read(at, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.flash.capacity()
+    }
+}
+
+impl NorFlash for Unreliable {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = 256;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerCut> {
+        self.flash.erase(from, to)
+    }
+
+    fn write(&mut self, at: u32, bytes: &[u8]) -> Result<(), PowerCut> {
+        let now = self.writes_before == 0;
+        self.writes_before = self.writes_before.wrapping_sub(1);
+        match self.treatment {
+            Treatment::Forgets if now => Ok(()),
+            Treatment::Misreports if now => self.flash.write(at, bytes).and(Err(PowerCut)),
+            _ => self.flash.write(at, bytes),
+        }
+    }
+}
+
+#[test]
+fn what_a_chip_says_of_a_write_counts_less_than_what_is_there() {
+    let room = &mut Buffer::new();
+    let containers = old_and_new();
+    let [old, new] = &containers;
+    let offset = MockFlash::<4, 256>::OFFSET;
+    let mut before = MockFlash::new();
+    let mut slots = Slots::open(&mut before, offset, room).unwrap();
+    assert_eq!(slots.write(old, room), Ok(1));
+    // The header, the container in blocks of 32 bytes, the commit record.
+    let writes = 1 + new.len().div_ceil(32) + 1;
+    for treatment in [Treatment::Forgets, Treatment::Misreports] {
+        for writes_before in 0..=writes {
+            let flash = Unreliable {
+                flash: before.clone(),
+                writes_before,
+                treatment,
+            };
+            let mut slots = Slots::open(flash, offset, room).unwrap();
+            let outcome = slots.write(new, room);
+            let is_header_or_commit = writes_before == 0 || writes_before == writes - 1;
+            match treatment {
+                _ if writes_before == writes => assert_eq!(outcome, Ok(2)),
+                Treatment::Forgets if is_header_or_commit => {
+                    assert_eq!(outcome, Err(UpdateError::NotWritten));
+                }
+                Treatment::Forgets => assert!(
+                    matches!(outcome, Err(UpdateError::Defect(Defect::Refused(_)))),
+                    "{outcome:?}"
+                ),
+                Treatment::Misreports if writes_before == writes - 1 => {
+                    assert_eq!(outcome, Ok(2), "the commit record is there");
+                }
+                Treatment::Misreports => {
+                    assert_eq!(outcome, Err(UpdateError::Flash(PowerCut)));
+                }
+            }
+            let newest = if outcome.is_ok() { new } else { old };
+            assert_eq!(slots.taken(), None, "the update is over");
+            let flash = slots.release();
+            let mut slots = Slots::open(flash, offset, room).unwrap();
+            match slots.in_use(room) {
+                InUse::Slot { genome, .. } => {
+                    assert_eq!(EncodedGenome::decode(newest), Ok(genome));
+                }
+                InUse::BuiltIn => panic!("{treatment:?} write {writes_before}: no genome"),
+            }
+        }
+    }
+}
+
+#[test]
 fn slots_that_are_empty_interrupted_and_unreadable_are_told_apart() {
     type Flash = MockFlash<4, 256>;
     let room = &mut Buffer::new();
@@ -465,8 +591,8 @@ fn a_genome_in_chunks_is_the_genome_whole() {
             flash
         };
         let [mut a, mut b] = [vec![0; whole_bytes(&whole)], vec![0; whole_bytes(&whole)]];
-        embedded_storage::nor_flash::ReadNorFlash::read(&mut flash, 0, &mut a).unwrap();
-        embedded_storage::nor_flash::ReadNorFlash::read(&mut whole.clone(), 0, &mut b).unwrap();
+        flash.read(0, &mut a).unwrap();
+        whole.clone().read(0, &mut b).unwrap();
         assert_eq!(a, b, "chunks of {size}");
     }
 }
