@@ -2,13 +2,12 @@
 //!
 //! Linking this module also brings in the logger and the critical section that it needs.
 //!
-//! The one module of this package with `unsafe` code: the runtime asks for an `unsafe fn` as
-//! handler of hard faults. It touches nothing that could be unsound.
+//! With `unsafe` code: the wheels' register is an address.
 #![allow(unsafe_code)]
 
+use crate::faults::{Fault, WheelsOff};
 use core::panic::PanicInfo;
 use cortex_m as _;
-use cortex_m_rt::{ExceptionFrame, exception};
 use cortex_m_semihosting::debug::{EXIT_FAILURE, EXIT_SUCCESS, ExitStatus, exit};
 use defmt_semihosting as _;
 
@@ -28,14 +27,22 @@ fn end(status: ExitStatus) -> ! {
     }
 }
 
+/// The lights of the board, which stand for the left and the right wheel: bits 0 and 1.
+pub(crate) const WHEELS: u32 = 0x4002_8000;
+
+// SAFETY: a register of lights only.
+static WHEELS_OFF: WheelsOff<1> = unsafe { WheelsOff::new([[WHEELS, 0]]) };
+
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
+    WHEELS_OFF.write();
     defmt::error!("{}", defmt::Display2Format(info));
     end(EXIT_FAILURE)
 }
 
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    defmt::error!("hard fault at {=u32:#010x}", frame.pc());
+fn say(fault: Fault) -> ! {
+    defmt::error!("{}", defmt::Display2Format(&fault));
     end(EXIT_FAILURE)
 }
+
+crate::fault_handlers!(WHEELS_OFF, say);

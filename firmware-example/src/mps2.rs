@@ -1,11 +1,13 @@
 //! The board of QEMU's machine `mps2-an386`: serial line, clock, and flash in a file on the host.
 //!
-//! It has no wheels and detects one neighbour that is not there; the link's step request is what
-//! drives it.
+//! Its wheels are two lights, and it detects one neighbour that is not there; the link's step
+//! request is what drives it.
 //!
 //! With `unsafe` code: device registers are addresses, and so are the arguments of semihosting.
 #![allow(unsafe_code)]
 
+use crate::board::WHEELS;
+use crate::faults::guard_stack;
 use crate::robot::{Board, Motion, NEIGHBOURS_MAX};
 use core::ptr;
 use cortex_m::interrupt::InterruptNumber;
@@ -68,6 +70,7 @@ impl Mps2 {
     /// Starts clock and line.
     #[must_use]
     pub fn new(mut systick: SYST) -> Self {
+        guard_stack();
         interrupt::disable();
         systick.set_clock_source(SystClkSource::Core);
         systick.set_reload(CLOCK_HZ / CONTROL_HZ - 1);
@@ -108,7 +111,16 @@ impl Board for Mps2 {
         true
     }
 
-    fn drive(&mut self, _: Motion) {}
+    fn drive(&mut self, motion: Motion) {
+        let turning = match motion {
+            Motion::Stop => 0b00,
+            Motion::Ahead => 0b11,
+            Motion::Left => 0b10,
+            Motion::Right => 0b01,
+        };
+        // SAFETY: a register of lights only.
+        unsafe { ptr::write_volatile(WHEELS as *mut u32, turning) };
+    }
 
     fn receive(&mut self) -> Option<u8> {
         if uart_state() & uart::STATE_RECEIVED == 0 {

@@ -25,6 +25,10 @@ const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 \
     -nographic -monitor none -serial none \
     -semihosting-config enable=on,target=native -kernel";
 
+/// QEMU's STM32F405: neither clock nor timers, and no pins; what is written to these is traced.
+const QEMU_STM32F4_ARGUMENTS: &str = "-machine netduinoplus2 \
+    -nographic -monitor none -serial none -d unimp,int -D";
+
 /// The built programs of `firmware-example`.
 pub struct Firmware {
     programs: PathBuf,
@@ -99,6 +103,12 @@ pub fn flash_bytes(program: &str) -> u32 {
         .sum()
 }
 
+/// The ELF file of a program that was linked.
+#[must_use]
+pub fn elf(program: &str) -> PathBuf {
+    programs().join(program)
+}
+
 /// The folder that the programs are built in.
 #[must_use]
 pub fn target_dir() -> PathBuf {
@@ -170,14 +180,102 @@ impl Firmware {
     }
 }
 
+/// What the wheels' registers of `mps2` and of the STM32F405 are called in QEMU's traces.
+const MPS2_WHEELS: &str = "mps2_fpgaio_write";
+const STM32F4_WHEELS: &str = "GPIOC: unimplemented device write";
+
+/// What a program did to its wheels before and in a fault, as QEMU has seen it.
+#[derive(Debug)]
+pub struct Faulted {
+    /// What was written to the wheels' registers, a line each.
+    pub wheels: Vec<String>,
+    /// The program's log, or, of the STM32F405, the exceptions that QEMU has seen.
+    pub log: String,
+}
+
+/// Runs the program `faults` of `mps2`, which provokes this fault and ends.
+///
+/// # Errors
+/// [`Missing`] if there is no QEMU.
+///
+/// # Panics
+/// If it does not fail by itself.
+pub fn fault_on_mps2(elf: &Path, fault: &str, trace: &Path) -> Result<Faulted, Missing> {
+    let mut log = Vec::new();
+    let arguments = QEMU_ARGUMENTS.replace(
+        "-semihosting",
+        &format!("-trace {MPS2_WHEELS} -D {} -semihosting", trace.display()),
+    );
+    let arguments = arguments.replace("=native", &format!("=native,arg=faults,arg={fault}"));
+    let status = run_with(&arguments, elf, |line| log.push(line))?;
+    let status = status.unwrap_or_else(|error| panic!("{fault}: {error}; it logged {log:?}"));
+    assert_eq!(status.code(), Some(1), "{fault}: {log:?}");
+    Ok(Faulted {
+        wheels: lines(trace, MPS2_WHEELS),
+        log: log.join("\n"),
+    })
+}
+
+/// Runs the program `faults-stm32f4`, which provokes this fault, until it has written to the wheels'
+/// registers three times: to turn the wheels, and twice to stop them.
+///
+/// # Errors
+/// [`Missing`] if there is no QEMU.
+///
+/// # Panics
+/// If QEMU fails.
+pub fn fault_on_stm32f4(elf: &Path, fault: &str, trace: &Path) -> Result<Faulted, Missing> {
+    let child = Command::new(QEMU)
+        .args(QEMU_STM32F4_ARGUMENTS.split_whitespace())
+        .arg(trace)
+        .arg("-semihosting-config")
+        .arg(format!("enable=on,target=native,arg=faults,arg={fault}"))
+        .arg("-kernel")
+        .arg(elf)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn();
+    let mut child = match child {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(no_qemu()),
+        child => child.unwrap_or_else(|error| panic!("{QEMU}: {error}")),
+    };
+    let end = Instant::now() + Duration::from_secs(60);
+    while lines(trace, STM32F4_WHEELS).len() < 3 && Instant::now() < end {
+        thread::sleep(Duration::from_millis(10));
+    }
+    child.kill().expect("it stands until then");
+    child.wait().expect("it has ended");
+    Ok(Faulted {
+        wheels: lines(trace, STM32F4_WHEELS),
+        log: lines(trace, "").join("\n"),
+    })
+}
+
+/// The lines of a file that start like this; none if it is not there yet.
+fn lines(path: &Path, start: &str) -> Vec<String> {
+    let text = fs::read_to_string(path).unwrap_or_default();
+    // The last line may be half there.
+    let text = text.rsplit_once('\n').map_or("", |(whole, _)| whole);
+    let lines = text.lines().filter(|line| line.starts_with(start));
+    lines.map(str::to_owned).collect()
+}
+
 /// Runs the program in an ELF file under QEMU, handing over each line it logs. Returns how it
 /// ended.
 ///
 /// # Errors
 /// [`Missing`] if there is no QEMU; inside, whatever went wrong with the file, its log or QEMU.
 pub fn run(elf: &Path, line: impl FnMut(String)) -> Result<io::Result<ExitStatus>, Missing> {
+    run_with(QEMU_ARGUMENTS, elf, line)
+}
+
+fn run_with(
+    arguments: &str,
+    elf: &Path,
+    line: impl FnMut(String),
+) -> Result<io::Result<ExitStatus>, Missing> {
     let child = Command::new(QEMU)
-        .args(QEMU_ARGUMENTS.split_whitespace())
+        .args(arguments.split_whitespace())
         .arg(elf)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())

@@ -1,16 +1,13 @@
-//! What happens beside the loop: bytes arrive, control periods begin, and whoever cannot go on
-//! stops the wheels.
+//! What happens beside the loop: bytes arrive, and control periods begin.
 //!
-//! The one module of this package with `unsafe` code: the runtime asks for an `unsafe fn` as
-//! handler of hard faults, and unmasking interrupts is unsafe. Neither touches memory.
+//! With `unsafe` code: unmasking interrupts is unsafe. It touches no memory.
 #![allow(unsafe_code)]
 
 use core::cell::RefCell;
-use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 use cortex_m::asm;
 use cortex_m::peripheral::NVIC;
-use cortex_m_rt::{ExceptionFrame, exception};
+use cortex_m_rt::exception;
 use critical_section::Mutex;
 use firmware_example::robot::Motion;
 use heapless::Deque;
@@ -105,13 +102,6 @@ pub(crate) fn sleep() {
     });
 }
 
-/// Stops the wheels and waits for the watchdog, which tells the host about itself.
-pub(crate) fn stand() -> ! {
-    loop {
-        drive(Motion::Stop);
-    }
-}
-
 impl<U: Instance> Receiver<U> {
     fn new(rx: Rx<U>) -> Self {
         let bytes = Deque::new();
@@ -150,18 +140,4 @@ fn SysTick() {
     if PERIOD_BEGUN.swap(true, Ordering::Relaxed) {
         drive(Motion::Stop);
     }
-}
-
-#[panic_handler]
-fn panic(info: &PanicInfo<'_>) -> ! {
-    drive(Motion::Stop);
-    defmt::error!("{}", defmt::Display2Format(info));
-    stand()
-}
-
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    drive(Motion::Stop);
-    defmt::error!("hard fault at {=u32:#010x}", frame.pc());
-    stand()
 }

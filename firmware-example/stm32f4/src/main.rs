@@ -13,6 +13,7 @@
 #![no_main]
 
 mod board;
+mod faults;
 mod flash;
 mod interrupts;
 mod wheels;
@@ -20,7 +21,7 @@ mod wheels;
 use board::{CLOCK_HZ, CONTROL_HZ, Stm32F4};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::entry;
-use defmt_rtt as _;
+use firmware_example::faults::guard_stack;
 use firmware_example::robot::Robot;
 use flash::SlotFlash;
 use stm32f4xx_hal::pac;
@@ -42,9 +43,10 @@ const _: () = assert!(SYSTICK_RELOAD < 1 << 24, "SysTick has 24 bits");
 
 #[entry]
 fn main() -> ! {
+    guard_stack();
     let peripherals = (cortex_m::Peripherals::take(), pac::Peripherals::take());
     let (Some(mut processor), Some(chip)) = peripherals else {
-        interrupts::stand()
+        faults::stand()
     };
     // By the chip's own oscillator: boards have various crystals, or none.
     let mut rcc = chip.RCC.freeze(Config::hsi().sysclk(CLOCK_HZ.Hz()));
@@ -73,7 +75,7 @@ fn main() -> ! {
     let module = chip.USART3.rx(b.pb11, BAUD.bps(), &mut rcc);
     let (Ok(line), Ok(module)) = (line, module) else {
         defmt::error!("the serial lines cannot have {=u32} baud", BAUD);
-        interrupts::stand()
+        faults::stand()
     };
     let (send, receive) = line.split();
     interrupts::listen(receive, module);
@@ -96,7 +98,7 @@ fn main() -> ! {
         Ok(mut robot) => robot.run(),
         Err(error) => {
             defmt::error!("{}", defmt::Debug2Format(&error));
-            interrupts::stand()
+            faults::stand()
         }
     }
 }

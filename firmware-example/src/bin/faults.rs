@@ -1,0 +1,17 @@
+//! Turns the wheels, which are lights here, and provokes the fault that QEMU's command line names.
+//! The test `faults` watches the wheels from outside.
+#![no_std]
+#![no_main]
+
+use cortex_m::Peripherals;
+use cortex_m_rt::entry;
+use firmware_example::mps2::Mps2;
+use firmware_example::provoke::provoke;
+use firmware_example::robot::{Board, Motion};
+
+#[entry]
+fn main() -> ! {
+    let peripherals = Peripherals::take().expect("taken once");
+    Mps2::new(peripherals.SYST).drive(Motion::Ahead);
+    provoke()
+}

@@ -1,0 +1,185 @@
+//! What happens first in every fault: the wheels stop.
+//!
+//! A fault may come while the program holds a lock, or because the stack is full. So the handlers
+//! of [`fault_handlers`](crate::fault_handlers) take no lock and use no stack and no variable until
+//! a few registers are written, the board's [`WheelsOff`]. Then they start again at the top of the
+//! stack, which nothing else needs any more, and say what has happened.
+//!
+//! **Stack guard.** `memory.x` puts the stack below all variables, at the start of RAM, and
+//! [`guard_stack`] forbids what is below RAM. So a stack that is full is a fault at once, and no
+//! variable is overwritten.
+//!
+//! With `unsafe` code: registers are addresses, and the handlers are in assembler.
+#![allow(unsafe_code)]
+
+use core::{fmt, ptr};
+
+/// The processor's register that says which exception is handled.
+const INTERRUPT_STATE: *const u32 = 0xe000_ed04 as *const u32;
+/// Its bits that do.
+const EXCEPTION: u32 = 0x1ff;
+/// The exception of a hard fault, and of the non-maskable interrupt.
+const HARD_FAULT: u32 = 3;
+const NON_MASKABLE: u32 = 2;
+/// Where an exception leaves the address of the instruction it came at, above the stack pointer.
+const PC_AT: u32 = 24;
+
+/// Registers of the memory protection unit.
+mod mpu {
+    pub(super) const CONTROL: *mut u32 = 0xe000_ed94 as *mut u32;
+    /// On; what no region covers is as without it. In faults it is off.
+    pub(super) const CONTROL_ON: u32 = 0b101;
+    pub(super) const REGION: *mut u32 = 0xe000_ed98 as *mut u32;
+    pub(super) const START: *mut u32 = 0xe000_ed9c as *mut u32;
+    pub(super) const ATTRIBUTES: *mut u32 = 0xe000_eda0 as *mut u32;
+    /// No access, no execution, 2¹⁵ bytes, on.
+    pub(super) const FORBIDDEN_32_KIB: u32 = 1 << 28 | 14 << 1 | 1;
+}
+
+/// The 32 KiB below RAM, more than any function's frame.
+const BELOW_RAM: u32 = 0x1fff_8000;
+
+/// Forbids the addresses below RAM, which begins at 0x20000000. Without this it is up to the chip
+/// what becomes of writes to where nothing is; QEMU's `mps2-an386` ignores them.
+pub fn guard_stack() {
+    // SAFETY: registers of the processor. No variable is in the region.
+    unsafe {
+        ptr::write_volatile(mpu::REGION, 0);
+        ptr::write_volatile(mpu::START, BELOW_RAM);
+        ptr::write_volatile(mpu::ATTRIBUTES, mpu::FORBIDDEN_32_KIB);
+        ptr::write_volatile(mpu::CONTROL, mpu::CONTROL_ON);
+        core::arch::asm!("dsb", "isb");
+    }
+}
+
+/// Register writes that stop the wheels, whatever the program was doing.
+#[derive(Debug)]
+#[repr(C)]
+pub struct WheelsOff<const N: usize> {
+    /// Address and value.
+    writes: [[u32; 2]; N],
+    /// Ends the list for the handlers.
+    end: u32,
+}
+
+impl<const N: usize> WheelsOff<N> {
+    /// Values to write, each behind the address of its register, in order.
+    ///
+    /// # Safety
+    /// The addresses are registers of the chip, not 0, and the values may be written at any time.
+    #[must_use]
+    pub const unsafe fn new(writes: [[u32; 2]; N]) -> Self {
+        Self { writes, end: 0 }
+    }
+
+    /// Stops the wheels.
+    pub fn write(&self) {
+        for [address, value] in self.writes {
+            // SAFETY: as promised to `new`.
+            unsafe { ptr::write_volatile(address as *mut u32, value) };
+        }
+    }
+}
+
+/// What the processor cannot go on after.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The stack is full.
+    StackOverflow,
+    /// A hard fault, at this address.
+    HardFault(u32),
+    /// The non-maskable interrupt, at this address.
+    NonMaskable(u32),
+    /// An exception or interrupt of this number that the program has no handler for, at this
+    /// address.
+    Unexpected(u32, u32),
+}
+
+impl Fault {
+    /// The fault whose handler runs, from the stack pointer at its start.
+    #[must_use]
+    pub fn from_stack_pointer(stack_pointer: u32) -> Self {
+        unsafe extern "C" {
+            static _stack_start: u32;
+            static _stack_end: u32;
+        }
+        let stack = (&raw const _stack_end) as u32..(&raw const _stack_start) as u32 - PC_AT;
+        if !stack.contains(&stack_pointer) {
+            return Self::StackOverflow;
+        }
+        // SAFETY: registers that the exception has left on the stack, and one of the processor.
+        let (pc, exception) = unsafe {
+            let pc = ptr::read_volatile((stack_pointer + PC_AT) as *const u32);
+            (pc, ptr::read_volatile(INTERRUPT_STATE) & EXCEPTION)
+        };
+        match exception {
+            HARD_FAULT => Self::HardFault(pc),
+            NON_MASKABLE => Self::NonMaskable(pc),
+            exception => Self::Unexpected(exception, pc),
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::StackOverflow => write!(f, "stack overflow"),
+            Self::HardFault(pc) => write!(f, "hard fault at {pc:#010x}"),
+            Self::NonMaskable(pc) => write!(f, "non-maskable interrupt at {pc:#010x}"),
+            Self::Unexpected(exception, pc) => {
+                write!(f, "unexpected exception {exception} at {pc:#010x}")
+            }
+        }
+    }
+}
+
+/// Defines the handlers of hard faults, which other faults become, and of all exceptions and
+/// interrupts without a handler of their own. They write a static [`WheelsOff`] and then call a
+/// `fn(Fault) -> !`.
+#[macro_export]
+macro_rules! fault_handlers {
+    ($wheels_off:ident, $then:path) => {
+        extern "C" fn fault(stack_pointer: u32) -> ! {
+            $then($crate::faults::Fault::from_stack_pointer(stack_pointer))
+        }
+
+        ::core::arch::global_asm!(
+            ".pushsection .text.fault_handlers, \"ax\", %progbits",
+            ".balign 4",
+            ".global HardFault",
+            ".type HardFault, %function",
+            ".thumb_func",
+            "HardFault:",
+            ".global DefaultHandler",
+            ".type DefaultHandler, %function",
+            ".thumb_func",
+            "DefaultHandler:",
+            "cpsid i",
+            "movw r0, #:lower16:{wheels_off}",
+            "movt r0, #:upper16:{wheels_off}",
+            "0:",
+            "ldr r1, [r0], #4",
+            "cbz r1, 1f",
+            "ldr r2, [r0], #4",
+            "str r2, [r1]",
+            "b 0b",
+            "1:",
+            "dsb",
+            // Floating-point registers that still have to be saved, on a stack that may be full,
+            // are given up.
+            "movw r1, #0xef34",
+            "movt r1, #0xe000",
+            "ldr r2, [r1]",
+            "bic r2, r2, #1",
+            "str r2, [r1]",
+            "mov r0, sp",
+            "movw r1, #:lower16:_stack_start",
+            "movt r1, #:upper16:_stack_start",
+            "mov sp, r1",
+            "b {fault}",
+            ".popsection",
+            wheels_off = sym $wheels_off,
+            fault = sym fault,
+        );
+    };
+}

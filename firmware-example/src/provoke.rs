@@ -1,0 +1,69 @@
+//! Faults on purpose, to see that the wheels stop. For the programs `faults`, under QEMU only.
+//!
+//! With `unsafe` code: what makes a fault is nothing else.
+#![allow(unsafe_code)]
+
+use core::arch::asm;
+use core::hint::black_box;
+use core::ptr;
+
+/// Semihosting's call for the command line.
+const GET_COMMAND_LINE: u32 = 0x15;
+/// The processor's register of pending exceptions, and its bit of the non-maskable interrupt.
+const INTERRUPT_STATE: *mut u32 = 0xe000_ed04 as *mut u32;
+const NON_MASKABLE_PENDING: u32 = 1 << 31;
+/// Enabling and causing interrupts 0 to 31.
+const INTERRUPTS_ENABLE: *mut u32 = 0xe000_e100 as *mut u32;
+const INTERRUPTS_PENDING: *mut u32 = 0xe000_e200 as *mut u32;
+/// An interrupt that no program here handles.
+const UNEXPECTED: u32 = 1 << 20;
+/// Forbidden: below RAM.
+const BELOW_RAM: *mut u32 = 0x1fff_fff0 as *mut u32;
+/// Registers of the processor, which are no program.
+const NO_PROGRAM: u32 = 0xe000_0001;
+
+/// Provokes the fault that the second word of QEMU's command line for the program names, with
+/// interrupts masked, as if it came while the wheels are set.
+///
+/// # Panics
+/// If that is what was asked for, and if there is no such fault.
+pub fn provoke() -> ! {
+    let mut line = [0_u8; 64];
+    let room: [u32; 2] = [line.as_mut_ptr() as u32, line.len() as u32];
+    // SAFETY: the host writes the line and its length, within the room.
+    unsafe {
+        asm!("bkpt #0xab", inout("r0") GET_COMMAND_LINE => _, in("r1") room.as_ptr());
+        asm!("cpsid i");
+    }
+    let line = core::str::from_utf8(&line).unwrap_or("");
+    let fault = line.trim_end_matches('\0').split(' ').nth(1);
+    // SAFETY: none of it; the handlers do not come back.
+    unsafe {
+        match fault {
+            Some("panic") => panic!("on purpose"),
+            Some("undefined-instruction") => asm!("udf #0"),
+            Some("write-below-ram") => ptr::write_volatile(BELOW_RAM, 1),
+            Some("jump-to-no-program") => asm!("bx {}", in(reg) NO_PROGRAM),
+            Some("non-maskable-interrupt") => {
+                ptr::write_volatile(INTERRUPT_STATE, NON_MASKABLE_PENDING);
+            }
+            Some("unexpected-interrupt") => {
+                ptr::write_volatile(INTERRUPTS_ENABLE, UNEXPECTED);
+                ptr::write_volatile(INTERRUPTS_PENDING, UNEXPECTED);
+                asm!("cpsie i");
+            }
+            Some("deep-recursion") => drop(black_box(recurse::<4>(1))),
+            Some("large-frames") => drop(black_box(recurse::<1024>(1))),
+            _ => panic!("no such fault: {line}"),
+        }
+        asm!("dsb", "isb");
+    }
+    panic!("nothing happened")
+}
+
+#[inline(never)]
+#[expect(unconditional_recursion)]
+fn recurse<const WORDS: usize>(depth: u32) -> u32 {
+    let frame = black_box([depth; WORDS]);
+    recurse::<WORDS>(depth + 1) + black_box(frame[WORDS - 1])
+}

@@ -1,0 +1,44 @@
+//! Wheels that stop whatever happens.
+//!
+//! With `unsafe` code: the wheels' registers are addresses.
+#![allow(unsafe_code)]
+
+use core::panic::PanicInfo;
+use cortex_m::{asm, interrupt};
+use defmt_rtt as _;
+use firmware_example::fault_handlers;
+use firmware_example::faults::{Fault, WheelsOff};
+
+/// Port C: which of its pins are outputs of the program, and setting and clearing them.
+const GPIOC_MODER: u32 = 0x4002_0800;
+const GPIOC_BSRR: u32 = 0x4002_0818;
+
+/// PC6 to PC9, speed and direction of both wheels, are low, and outputs of the program: the timer
+/// has no pin any more. Nothing else is on port C, and its other pins are inputs, as after a reset.
+// SAFETY: only pins of the wheels.
+static WHEELS_OFF: WheelsOff<2> =
+    unsafe { WheelsOff::new([[GPIOC_BSRR, 0x03c0_0000], [GPIOC_MODER, 0x0005_5000]]) };
+
+/// Stops the wheels and waits for the watchdog, which tells the host about itself.
+pub(crate) fn stand() -> ! {
+    interrupt::disable();
+    WHEELS_OFF.write();
+    loop {
+        asm::nop();
+    }
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    interrupt::disable();
+    WHEELS_OFF.write();
+    defmt::error!("{}", defmt::Display2Format(info));
+    stand()
+}
+
+fn say(fault: Fault) -> ! {
+    defmt::error!("{}", defmt::Display2Format(&fault));
+    stand()
+}
+
+fault_handlers!(WHEELS_OFF, say);
