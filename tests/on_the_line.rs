@@ -2,15 +2,23 @@
 //! on a port.
 #![cfg(target_os = "linux")]
 
-use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Topology};
-use minimal_surprise_link::Handler;
+use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Surprise, Topology};
+use minimal_surprise_evolver::robot::{Afterwards, PortName, Robot};
+use minimal_surprise_link::{GenomeInUse, Handler, Report};
 use serde_json::Value;
-use std::time::Duration;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::process::{Command, Stdio};
+use std::sync::atomic::AtomicBool;
+use std::thread;
+use std::time::{Duration, Instant};
 use tests::full;
 use tests::genome::{of_another_kernel, random};
 use tests::link_robot::Flash;
 use tests::program::{Evolver, Finished};
 use tests::pty::{Answer, Device, Fault, PluggedRobot};
+
+/// Longest wait for a command's end.
+const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A folder with two genomes for this arithmetic and one for another.
 fn with_genomes() -> Evolver {
@@ -47,7 +55,16 @@ fn crc_of(container: &[u8]) -> String {
 
 /// One message with all these words, and the exit code for bad input.
 fn assert_refused(run: &Finished, words: &[&str]) {
-    assert_eq!(run.code, Some(2), "{run:?}");
+    assert_error(run, 2, words);
+}
+
+/// One message with all these words, and the exit code for what broke.
+fn assert_failed(run: &Finished, words: &[&str]) {
+    assert_error(run, 1, words);
+}
+
+fn assert_error(run: &Finished, code: i32, words: &[&str]) {
+    assert_eq!(run.code, Some(code), "{run:?}");
     let errors: Vec<&str> = run
         .stderr
         .lines()
@@ -64,11 +81,13 @@ fn assert_refused(run: &Finished, words: &[&str]) {
 }
 
 /// Every command that talks to a robot, on this port.
-fn all_commands(port: &str) -> [Vec<&str>; 3] {
+fn all_commands(port: &str) -> [Vec<&str>; 5] {
     [
         vec!["flash", "new.genome", "--port", port],
         vec!["monitor", "--port", port, "--for", "1"],
         vec!["hil", "old.genome", "--port", port, "--steps", "5"],
+        vec!["start", "--port", port],
+        vec!["stop", "--port", port],
     ]
 }
 
@@ -144,8 +163,8 @@ fn monitor_ends_at_ctrl_c() {
     let robot = with_the_old_genome(&evolver, Fault::None);
     let watching = evolver.start(&["monitor", "--port", &robot.device.port]);
     watching.wait_for_lines(1);
-    let ended = watching.interrupt(Duration::from_secs(10));
-    assert_eq!(ended.code, Some(0), "{ended:?}");
+    let ended = watching.interrupt(PATIENCE);
+    assert_eq!(ended.code, Some(130), "{ended:?}");
 }
 
 #[test]
@@ -217,6 +236,10 @@ fn bad_flags_name_the_flag_the_value_and_what_is_valid() {
             "--for = 0: expected a whole number from 1",
         ),
         (
+            "start --port nowhere --wait never",
+            "--wait = never: expected a whole number from 1 to 3600",
+        ),
+        (
             "flash old.genome --port nowhere --baud fast",
             "--baud = fast: expected a whole number from 1",
         ),
@@ -246,9 +269,13 @@ fn a_port_that_is_none_is_refused() {
     }
     for arguments in all_commands("new.genome") {
         let run = evolver.run(&arguments);
-        assert_refused(&run, &["--port = new.genome: a file or folder"]);
+        assert_refused(
+            &run,
+            &["--port = new.genome: a file, folder or device that is no"],
+        );
     }
-    assert_refused(&flash(&evolver, "new.genome", "/dev/null"), &["/dev/null"]);
+    let device = flash(&evolver, "new.genome", "/dev/null");
+    assert_refused(&device, &["/dev/null: a file, folder or device that is no"]);
 }
 
 #[test]
@@ -257,7 +284,10 @@ fn a_port_that_says_nothing_is_refused() {
     let silent = Device::plug_in(|_| Answer::Bytes(Vec::new()));
     for arguments in all_commands(&silent.port) {
         let run = evolver.run(&arguments);
-        assert_refused(&run, &[&silent.port, "silence for 2.", "115200 baud"]);
+        assert_failed(
+            &run,
+            &[&silent.port, "silence for 2.", "115200 baud", "--wait"],
+        );
     }
 }
 
@@ -267,7 +297,10 @@ fn another_device_is_refused() {
     let another = |device: &Device, words: &str| {
         for arguments in all_commands(&device.port) {
             let run = evolver.run(&arguments);
-            assert_refused(&run, &[&device.port, "another device is talking", words]);
+            assert_failed(
+                &run,
+                &[&device.port, "another device is talking", words, "--wait"],
+            );
         }
     };
     let echo = Device::plug_in(|bytes| Answer::Bytes(bytes.to_vec()));
@@ -289,7 +322,7 @@ fn a_device_that_never_stops_talking_is_refused() {
     let compass = Device::talking(b"$HCHDG,101.1,,,7.1,W*3C\r\n");
     for arguments in all_commands(&compass.port) {
         let run = evolver.run(&arguments);
-        assert_refused(&run, &["another device is talking", "without a message"]);
+        assert_failed(&run, &["another device is talking", "without a message"]);
     }
 }
 
@@ -324,7 +357,7 @@ fn a_robot_of_another_kernel_is_refused_before_anything_is_stopped_or_erased() {
             "the robot is kernel {}, this program is",
             KernelId(kernel.0)
         );
-        assert_refused(&run, &[&words]);
+        assert_failed(&run, &[&words]);
     }
     assert_eq!(robot.robot().done, 0);
     assert_eq!(crc_in_use(&robot), before);
@@ -350,7 +383,7 @@ fn a_line_pulled_half_way_leaves_the_old_genome_in_use() {
             } else {
                 "it keeps the genome that it had"
             };
-            assert_refused(&run, &[&robot.device.port, words, keeps]);
+            assert_failed(&run, &[&robot.device.port, words, keeps]);
             let restarted = PluggedRobot::start(robot.stop(), Fault::None);
             let old = crc_of(&evolver.read("old.genome"));
             assert!(crc_in_use(&restarted).contains(&old), "{fault:?}");
@@ -365,10 +398,10 @@ fn a_line_pulled_during_monitor_or_hil_is_told() {
     let evolver = with_genomes();
     let robot = with_the_old_genome(&evolver, Fault::PulledAfter(20));
     let run = evolver.run(&["hil", "old.genome", "--port", &robot.device.port]);
-    assert_refused(&run, &["the line broke while the robot was stepping"]);
+    assert_failed(&run, &["the line broke while the robot was stepping"]);
     let robot = with_the_old_genome(&evolver, Fault::MuteAfter(20));
     let run = evolver.run(&["hil", "old.genome", "--port", &robot.device.port]);
-    assert_refused(&run, &["no answer any more, while the robot was stepping"]);
+    assert_failed(&run, &["no answer any more, while the robot was stepping"]);
 
     let robot = with_the_old_genome(&evolver, Fault::None);
     let port = robot.device.port.clone();
@@ -378,7 +411,7 @@ fn a_line_pulled_during_monitor_or_hil_is_told() {
         drop(robot);
         watching.join().unwrap()
     });
-    assert_eq!(run.code, Some(2), "{run:?}");
+    assert_eq!(run.code, Some(1), "{run:?}");
     let told = "the line broke while the robot was reporting";
     assert!(run.stderr.contains(told), "{run:?}");
 }
@@ -390,7 +423,271 @@ fn a_commit_whose_answer_is_lost_is_found_out_about() {
     let robot = with_the_old_genome(&evolver, Fault::MuteAfter(3 + chunks));
     let run = flash(&evolver, "new.genome", &robot.device.port);
     let words = "either the genome that it had or the new one: run the command again";
-    assert_refused(&run, &["committing a genome", words]);
+    assert_failed(&run, &["committing a genome", words]);
     let new = crc_of(&evolver.read("new.genome"));
     assert!(crc_in_use(&robot).contains(&new));
+}
+
+/// The line that starts a robot on this port.
+fn start_line(port: &str) -> String {
+    format!("the robot may be standing now; start it with: evolver start --port {port}")
+}
+
+/// Waits until the robot has done so much.
+fn wait_for(robot: &PluggedRobot, done: u64) {
+    let started = Instant::now();
+    while robot.robot().done < done {
+        assert!(started.elapsed() < PATIENCE, "it does not do that");
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn start_and_stop_do_and_say_so() {
+    let evolver = with_genomes();
+    let robot = with_the_old_genome(&evolver, Fault::None);
+    let port = robot.device.port.as_str();
+    for (command, state, running) in [
+        ("start", "running", true),
+        ("start", "running", true),
+        ("stop", "standing", false),
+    ] {
+        let run = evolver.run(&[command, "--port", port]);
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let says = format!("{port}: robot 0.1.0, {state}, genome 1 in slot ");
+        assert!(run.stdout.starts_with(&says), "{run:?}");
+        assert_eq!(robot.robot().identify().running, running);
+    }
+}
+
+#[test]
+fn whoever_else_reads_the_port_every_command_ends() {
+    let evolver = with_genomes();
+    let rounds = if full::all_cases() { 20 } else { 4 };
+    let one = |kind: usize| {
+        let robot = with_the_old_genome(&evolver, Fault::None);
+        let port = robot.device.port.clone();
+        let mut other = Command::new("cat")
+            .arg(&port)
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        let arguments = match kind {
+            0 => vec!["hil", "old.genome", "--steps", "12", "--port", &port],
+            1 => vec!["monitor", "--for", "2", "--port", &port],
+            _ => vec!["flash", "new.genome", "--port", &port],
+        };
+        let run = evolver.start(&arguments).ended(PATIENCE);
+        other.kill().unwrap();
+        other.wait().unwrap();
+        if run.code != Some(0) {
+            assert_failed(&run, &[&port]);
+            let error = run.stderr.lines().last().unwrap_or_default();
+            assert!(error.contains("another "), "{run:?}");
+        }
+        run.code
+    };
+    let kinds = if full::all_cases() { 3 } else { 2 };
+    let codes: Vec<Option<i32>> = thread::scope(|scope| {
+        let runs: Vec<_> = (0..rounds * kinds)
+            .map(|run| scope.spawn(move || one(run % kinds)))
+            .collect();
+        runs.into_iter().map(|run| run.join().unwrap()).collect()
+    });
+    println!("exit codes {codes:?}");
+}
+
+#[test]
+fn a_port_that_another_program_has_locked_is_in_use() {
+    let evolver = with_genomes();
+    let robot = with_the_old_genome(&evolver, Fault::None);
+    let port = robot.device.port.as_str();
+    let watching = evolver.start(&["monitor", "--port", port]);
+    watching.wait_for_lines(1);
+    let run = flash(&evolver, "new.genome", port);
+    assert_failed(&run, &[port, "in use by another program"]);
+    assert_eq!(watching.interrupt(PATIENCE).code, Some(130));
+}
+
+#[test]
+fn a_board_that_restarts_when_its_port_is_opened_is_waited_for() {
+    let evolver = &with_genomes();
+    let noise = b"\xff\0boot: v1.2\r\n\0\x07";
+    let ask = |restarts_for, noise, wait: &str| {
+        let silence = Duration::from_millis(restarts_for);
+        let robot = PluggedRobot::restarting(Flash::new(), Fault::None, silence, noise);
+        evolver.run(&["stop", "--port", &robot.device.port, "--wait", wait])
+    };
+    thread::scope(|scope| {
+        let answered = [
+            (1000, &b""[..], "2"),
+            (2400, b"", "4"),
+            (2400, noise, "4"),
+            (6000, noise, "9"),
+        ];
+        let answered = answered
+            .map(|(restarts_for, noise, wait)| scope.spawn(move || ask(restarts_for, noise, wait)));
+        let given_up = scope.spawn(move || ask(6000, noise, "2"));
+        for run in answered {
+            let run = run.join().unwrap();
+            assert_eq!(run.code, Some(0), "{run:?}");
+        }
+        let run = given_up.join().unwrap();
+        assert_failed(&run, &["another device is talking", "--wait 10"]);
+    });
+}
+
+#[test]
+fn ctrl_c_during_flash_leaves_the_robot_as_it_was_found() {
+    let evolver = with_genomes();
+    for (running, signal) in [(true, "INT"), (false, "TERM")] {
+        let robot = with_the_old_genome(&evolver, Fault::SlowAfter(2));
+        let before = crc_in_use(&robot);
+        let mut done = 0;
+        if running {
+            robot.robot().start().unwrap();
+            done = 1;
+        }
+        let port = robot.device.port.as_str();
+        let flashing = evolver.start(&["flash", "new.genome", "--port", port]);
+        wait_for(&robot, done + 2);
+        flashing.signal(signal);
+        let run = flashing.ended(PATIENCE);
+        assert_eq!(run.code, Some(130), "{run:?}");
+        let words = "interrupted while the robot was receiving a genome; it keeps";
+        assert!(run.stderr.contains(words), "{run:?}");
+        assert!(!run.stderr.contains("evolver start"), "{run:?}");
+        assert_eq!(robot.robot().identify().running, running);
+        assert_eq!(crc_in_use(&robot), before);
+    }
+}
+
+#[test]
+fn ctrl_c_during_hil_leaves_the_robot_as_it_was_found() {
+    let evolver = with_genomes();
+    for (running, signal) in [(true, "INT"), (false, "INT"), (true, "TERM")] {
+        let robot = with_the_old_genome(&evolver, Fault::SlowAfter(4));
+        if running {
+            robot.robot().start().unwrap();
+        }
+        let port = robot.device.port.as_str();
+        let stepping = evolver.start(&["hil", "old.genome", "--port", port]);
+        wait_for(&robot, 6);
+        stepping.signal(signal);
+        let run = stepping.ended(PATIENCE);
+        assert_eq!(run.code, Some(130), "{run:?}");
+        assert!(
+            run.stderr
+                .contains("interrupted while the robot was stepping"),
+            "{run:?}"
+        );
+        let mut robot = robot.robot();
+        assert_eq!(robot.identify().running, running);
+        assert_eq!(robot.telemetry().surprise, Surprise::default());
+    }
+}
+
+#[test]
+fn a_second_ctrl_c_ends_at_once_and_says_what_starts_the_robot() {
+    let evolver = with_genomes();
+    // It begins, and its answer is waited for.
+    let robot = with_the_old_genome(&evolver, Fault::MuteAfter(3));
+    robot.robot().start().unwrap();
+    let port = robot.device.port.as_str();
+    let flashing = evolver.start(&["flash", "new.genome", "--port", port]);
+    wait_for(&robot, 3);
+    flashing.signal("INT");
+    // The robot, an empty line, what the first one does.
+    flashing.wait_for_lines(3);
+    let run = flashing.interrupt(PATIENCE);
+    assert_eq!(run.code, Some(130), "{run:?}");
+    assert_eq!(run.stderr.lines().last(), Some(start_line(port).as_str()));
+}
+
+#[test]
+fn a_lost_line_says_what_starts_a_robot_that_was_running() {
+    let evolver = with_genomes();
+    for command in ["flash", "hil"] {
+        for fault in [Fault::PulledAfter(3), Fault::MuteAfter(3)] {
+            if (command, fault) == ("flash", Fault::MuteAfter(3)) && !full::all_cases() {
+                continue;
+            }
+            let robot = with_the_old_genome(&evolver, fault);
+            robot.robot().start().unwrap();
+            let port = robot.device.port.as_str();
+            let run = evolver.run(&[command, "old.genome", "--port", port]);
+            assert_failed(&run, &[&start_line(port)]);
+        }
+    }
+}
+
+#[test]
+fn a_panic_leaves_the_robot_as_it_was_found() {
+    static NEVER: AtomicBool = AtomicBool::new(false);
+    let evolver = with_genomes();
+    for running in [true, false] {
+        let robot = with_the_old_genome(&evolver, Fault::None);
+        if running {
+            robot.robot().start().unwrap();
+        }
+        let port = PortName(robot.device.port.clone());
+        let mut line = Robot::connect(&port, 115_200, Duration::from_secs(2), &NEVER).unwrap();
+        let panicked = catch_unwind(AssertUnwindSafe(|| {
+            line.while_stopped(Afterwards::Runs, "", |_| -> Result<(), _> {
+                panic!("on purpose")
+            })
+        }));
+        assert!(panicked.is_err());
+        assert_eq!(robot.robot().identify().running, running);
+    }
+}
+
+#[test]
+fn impossible_numbers_are_told_and_not_computed_with() {
+    let evolver = with_genomes();
+    let robot = with_the_old_genome(&evolver, Fault::None);
+    let port = robot.device.port.as_str();
+    let surprise = |mispredicted_bits, seen_bits| Surprise {
+        mispredicted_bits,
+        seen_bits,
+    };
+    let report = |surprise| Report {
+        surprise,
+        straight: 3,
+        ..Report::default()
+    };
+    for (claim, words) in [
+        (
+            report(surprise(u64::MAX, 1)),
+            "impossible counts: 18446744073709551615 of 1 bits mispredicted",
+        ),
+        (
+            report(surprise(0, u64::MAX)),
+            "impossible counts: 18446744073709551615 bits seen in ",
+        ),
+        (
+            Report {
+                held_back: 4,
+                ..report(surprise(0, 42))
+            },
+            "impossible counts: 4 of 3 steps ahead held back",
+        ),
+    ] {
+        robot.robot().claims_report = Some(claim);
+        let run = evolver.run(&["monitor", "--port", port, "--for", "2"]);
+        assert_failed(&run, &[port, words]);
+        if claim.held_back == 0 {
+            let run = evolver.run(&["hil", "old.genome", "--port", port]);
+            assert_failed(&run, &[port, words]);
+        }
+    }
+    robot.robot().claims_genome = Some(GenomeInUse::Slot {
+        slot: 7,
+        write_count: 1,
+        length: 100,
+        crc: 0,
+    });
+    for arguments in all_commands(port) {
+        assert_failed(&evolver.run(&arguments), &[port, "impossible slot: 7"]);
+    }
 }

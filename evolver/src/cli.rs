@@ -13,7 +13,9 @@ use crate::commands::hil::{HilArgs, hil};
 use crate::commands::import::{ImportArgs, import};
 use crate::commands::inspect::inspect;
 use crate::commands::monitor::{MonitorArgs, monitor};
+use crate::commands::port::PortArgs;
 use crate::commands::replay::{ReplayArgs, replay};
+use crate::commands::start::{start, stop};
 use crate::commands::suite::{SuiteArgs, TaskArgs, Verb, paper, run_task, suite};
 use crate::exit::Exit;
 use crate::output;
@@ -63,6 +65,10 @@ enum Command {
     Flash(FlashArgs),
     /// Show what the robot on a serial port does, and how surprised it is, until Ctrl-C.
     Monitor(MonitorArgs),
+    /// Start the robot on a serial port, as it is.
+    Start(PortArgs),
+    /// Stop the robot on a serial port.
+    Stop(PortArgs),
     /// Run a simulated swarm whose robot 0 is the robot on a serial port, and compare.
     Hil(HilArgs),
     /// Make genome files of the genome text of the program that the paper's authors published.
@@ -133,7 +139,9 @@ fn run(arguments: Cli) -> anyhow::Result<Exit> {
         Some(Command::Damage(arguments)) => damage(&arguments).map(done),
         Some(Command::Export(arguments)) => export(&arguments).map(done),
         Some(Command::Flash(arguments)) => flash(&arguments).map(done),
-        Some(Command::Monitor(arguments)) => monitor(&arguments).map(done),
+        Some(Command::Monitor(arguments)) => monitor(&arguments),
+        Some(Command::Start(arguments)) => start(&arguments).map(done),
+        Some(Command::Stop(arguments)) => stop(&arguments).map(done),
         Some(Command::Hil(arguments)) => hil(&arguments),
         Some(Command::Import(arguments)) => import(&arguments).map(done),
         Some(Command::Inspect { genome }) => inspect(&genome).map(done),

@@ -5,7 +5,7 @@ use firmware_example::robot::{genome_in_use, refusal};
 use minimal_surprise_controller::{
     Action, Controller, Decision, KERNEL_ID, KernelId, SensorBits, State, Turn,
 };
-use minimal_surprise_link::{Faults, Handler, Identity, Refusal, Report, Stepped};
+use minimal_surprise_link::{Faults, GenomeInUse, Handler, Identity, Refusal, Report, Stepped};
 use minimal_surprise_slots::{Buffer, Slots};
 
 /// Its flash.
@@ -24,6 +24,10 @@ pub struct LinkRobot {
     pub kernel: KernelId,
     /// The step, counted from 0 since the last reset, in which its controller errs.
     pub errs_in_step: Option<u32>,
+    /// The genome that it says is in use, if that is a lie.
+    pub claims_genome: Option<GenomeInUse>,
+    /// What it reports, if that is a lie; its surprise is that of its steps, too.
+    pub claims_report: Option<Report>,
     /// Requests carried out, identification and telemetry not counted.
     pub done: u64,
 }
@@ -47,6 +51,8 @@ impl LinkRobot {
             report: Report::default(),
             kernel: KERNEL_ID,
             errs_in_step: None,
+            claims_genome: None,
+            claims_report: None,
             done: 0,
         }
     }
@@ -96,7 +102,7 @@ impl Handler for LinkRobot {
             firmware: "robot",
             version: "0.1.0",
             kernel: self.kernel,
-            genome: genome_in_use(&self.slots),
+            genome: (self.claims_genome).unwrap_or_else(|| genome_in_use(&self.slots)),
             running: self.report.running,
             faults: self.faults(),
         }
@@ -137,7 +143,7 @@ impl Handler for LinkRobot {
         }
         Ok(Stepped {
             decision,
-            surprise: self.state.surprise(),
+            surprise: (self.claims_report).map_or(self.state.surprise(), |claim| claim.surprise),
         })
     }
 
@@ -161,6 +167,9 @@ impl Handler for LinkRobot {
     }
 
     fn telemetry(&mut self) -> Report {
+        if let Some(claim) = self.claims_report {
+            return claim;
+        }
         Report {
             surprise: self.state.surprise(),
             faults: self.faults(),

@@ -232,19 +232,38 @@ impl Running {
     /// # Panics
     /// If it does not end in time.
     #[must_use]
-    pub fn interrupt(mut self, patience: Duration) -> Finished {
-        let id = self.child.id().to_string();
+    pub fn interrupt(self, patience: Duration) -> Finished {
+        self.signal("INT");
+        self.ended(patience)
+    }
+
+    /// Sends it a signal.
+    ///
+    /// # Panics
+    /// If it has ended.
+    pub fn signal(&self, signal: &str) {
         // The shell's own: the program is not part of a bare system.
-        let sent = Command::new("sh")
-            .args(["-c", &format!("kill -INT {id}")])
-            .status();
-        assert!(sent.is_ok_and(|status| status.success()), "kill -INT {id}");
+        let command = format!("kill -{signal} {}", self.child.id());
+        let sent = Command::new("sh").args(["-c", &command]).status();
+        assert!(sent.is_ok_and(|status| status.success()), "{command}");
+    }
+
+    /// Waits for its end.
+    ///
+    /// # Panics
+    /// If it does not end in time.
+    #[must_use]
+    pub fn ended(mut self, patience: Duration) -> Finished {
         let started = Instant::now();
         let status = loop {
             if let Some(status) = self.child.try_wait().expect("it is our child") {
                 break status;
             }
-            assert!(started.elapsed() < patience, "it goes on after Ctrl-C");
+            if started.elapsed() > patience {
+                let _ = self.child.kill();
+                let said = self.lines.iter().collect::<Vec<_>>();
+                panic!("it goes on after {patience:?}; it said {said:?}");
+            }
             std::thread::sleep(Duration::from_millis(5));
         };
         let mut stdout = String::new();

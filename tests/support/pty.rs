@@ -10,7 +10,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A device on a serial port. Dropping it unplugs it.
 #[derive(Debug)]
@@ -53,6 +53,27 @@ impl Device {
                     Answer::Bytes(bytes) if master.write_all(&bytes).is_ok() => {}
                     _ => break,
                 }
+            }
+        })
+    }
+
+    /// Plugs a device in behind a board that restarts: from the first byte that arrives on, for so
+    /// long, it hears nothing, and says this again and again.
+    ///
+    /// # Panics
+    /// If there are no pseudo-terminals to be had.
+    #[must_use]
+    pub fn restarting(
+        silence: Duration,
+        noise: &'static [u8],
+        mut answer: impl FnMut(&[u8]) -> Answer + Send + 'static,
+    ) -> Self {
+        let mut first = None;
+        Self::plug_in(move |bytes| {
+            let first = *first.get_or_insert_with(Instant::now);
+            match first.elapsed() < silence {
+                true => Answer::Bytes(noise.to_vec()),
+                false => answer(bytes),
             }
         })
     }
@@ -131,16 +152,25 @@ pub enum Fault {
     PulledAfter(u64),
     /// The robot's answers are lost from then on.
     MuteAfter(u64),
+    /// Each answer takes 0.3 s from then on.
+    SlowAfter(u64),
 }
 
 impl PluggedRobot {
     /// Switches a robot on and plugs it in.
     #[must_use]
     pub fn start(flash: Flash, fault: Fault) -> Self {
+        Self::restarting(flash, fault, Duration::ZERO, b"")
+    }
+
+    /// The same with a board that restarts when it is first talked to: it takes so long, says this
+    /// and hears nothing.
+    #[must_use]
+    pub fn restarting(flash: Flash, fault: Fault, silence: Duration, noise: &'static [u8]) -> Self {
         let robot = Arc::new(Mutex::new(LinkRobot::start(flash)));
         let behind = Arc::clone(&robot);
         let mut server = Server::new();
-        let device = Device::plug_in(move |bytes| {
+        let device = Device::restarting(silence, noise, move |bytes| {
             let mut robot = lock(&behind);
             let mut answers = Vec::new();
             for &byte in bytes {
@@ -149,6 +179,10 @@ impl PluggedRobot {
             match fault {
                 Fault::PulledAfter(done) if robot.done >= done => Answer::Unplugged,
                 Fault::MuteAfter(done) if robot.done >= done => Answer::Bytes(Vec::new()),
+                Fault::SlowAfter(done) if robot.done >= done => {
+                    thread::sleep(Duration::from_millis(300));
+                    Answer::Bytes(answers)
+                }
                 _ => Answer::Bytes(answers),
             }
         });

@@ -1,12 +1,13 @@
 //! `evolver hil`: a simulated swarm with the robot on the line in it.
 
 use super::conditions::GenomeConditions;
-use super::{BadInput, PortArgs, read_genome};
+use super::port::{PortArgs, failed};
+use super::{BadInput, read_genome};
 use crate::exit::Exit;
 use crate::finished_run::FinishedRun;
 use crate::hil::{Course, HilError, Ran};
-use crate::report::summary::program;
-use crate::robot::{Robot, RobotError, describe, is_in_use};
+use crate::report::summary::shell_word;
+use crate::robot::{Afterwards, Robot, RobotError, describe, is_in_use};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use minimal_surprise_controller::{Controller, EncodedGenome};
@@ -43,29 +44,29 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
         show_line!("hash        {}", simulated.hash);
         return Ok(Exit::Done);
     };
-    let (port, baud) = port.checked()?;
-    let mut robot = Robot::connect(&port, baud).map_err(BadInput::new)?;
-    tell!("{port}: {}", robot.identity());
-    robot.check_kernel().map_err(BadInput::new)?;
+    let mut robot = port.connect()?;
+    robot.check_kernel().map_err(failed)?;
     let container = read_genome(&genome)?;
     if !is_in_use(robot.identity().genome, &container) {
         return Err(BadInput::new(format!(
-            "--port = {port}: the robot runs {}, not {}; put that onto it with: {} flash {} --port {port}",
+            "--port = {}: the robot runs {}, not {}; put that onto it with: {}",
+            port.name(),
             describe(robot.identity().genome),
             genome.display(),
-            program(),
-            genome.display(),
+            port.command(&format!("flash {}", shell_word(&genome))),
         ))
         .into());
     }
-    let was_running = robot.identity().running;
-    robot.stop().map_err(BadInput::new)?;
-    let ran = run(&course, &mut robot).map_err(BadInput::new)?;
-    // The robot is left as it was found.
-    robot.reset().map_err(BadInput::new)?;
-    if was_running {
-        robot.start().map_err(BadInput::new)?;
-    }
+    let ran = robot.while_stopped(
+        Afterwards::StartsAnew,
+        &port.command("start"),
+        |robot| match run(&course, robot) {
+            Ok(ran) => Ok(Ok(ran)),
+            Err(HilError::World(error)) => Ok(Err(error)),
+            Err(HilError::Robot(error)) => Err(error),
+        },
+    );
+    let ran = ran.map_err(failed)?.map_err(BadInput::new)?;
     show_line!("hash        {}", ran.hash);
     if ran == simulated {
         show_line!("simulation  {}, equal", simulated.hash);

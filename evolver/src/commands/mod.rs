@@ -14,7 +14,9 @@ pub mod import;
 pub mod inspect;
 pub mod monitor;
 pub mod pictures;
+pub mod port;
 pub mod replay;
+pub mod start;
 pub mod suite;
 
 use crate::damaged_runs::DamagedRuns;
@@ -22,10 +24,7 @@ use crate::exit::Exit;
 use crate::files;
 use crate::output;
 use crate::report::summary::shell_word;
-use crate::robot::PortName;
 use crate::run_dir::RunDirError;
-use crate::settings::count;
-use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use std::path::{Path, PathBuf};
@@ -47,6 +46,11 @@ impl BadInput {
 #[error("{0}")]
 pub struct Unfinished(String);
 
+/// A signal has ended what was done with a robot; the message says what that leaves.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Interrupted(String);
+
 /// How the program ends after an error.
 #[must_use]
 pub fn exit_of(error: &anyhow::Error) -> Exit {
@@ -55,6 +59,8 @@ pub fn exit_of(error: &anyhow::Error) -> Exit {
         Exit::BadInput
     } else if error.is::<Unfinished>() {
         Exit::Unfinished
+    } else if error.is::<Interrupted>() {
+        Exit::Interrupted
     } else {
         Exit::Failure
     }
@@ -103,29 +109,6 @@ fn name_damaged(damaged: &DamagedRuns, again: Option<&str>) -> Exit {
 pub fn thread_pool(threads: Option<u32>) -> Result<rayon::ThreadPool, rayon::ThreadPoolBuildError> {
     let threads = threads.unwrap_or(0) as usize;
     rayon::ThreadPoolBuilder::new().num_threads(threads).build()
-}
-
-/// Where a robot is.
-#[derive(Debug, Args)]
-pub struct PortArgs {
-    /// The serial port that the robot is on, as in /dev/ttyACM0 or COM3.
-    #[arg(long, value_name = "PORT")]
-    port: String,
-    /// Speed of the line, in bits a second.
-    #[arg(
-        long,
-        value_name = "N",
-        default_value = "115200",
-        allow_hyphen_values = true
-    )]
-    baud: String,
-}
-
-impl PortArgs {
-    fn checked(&self) -> Result<(PortName, u32), BadInput> {
-        let baud = evaluate::flag("baud", &self.baud, |text| count(text, 12_000_000))?;
-        Ok((PortName(self.port.clone()), baud))
-    }
 }
 
 /// The genome file that a path names: of a run directory, its best genome.

@@ -1,19 +1,24 @@
 //! `evolver monitor`: what a robot does, live.
 
 use super::evaluate::flag;
-use super::{BadInput, PortArgs};
+use super::port::{PortArgs, failed};
+use crate::exit::Exit;
 use crate::output;
-use crate::robot::{Robot, fault_names};
+use crate::robot::{Problem, fault_names, since};
 use crate::settings::count;
-use crate::signals::on_signal;
+use crate::signals::stop;
 use clap::Args;
 use console::Term;
 use minimal_surprise_controller::Surprise;
 use minimal_surprise_link::{LineCounters, Report};
 use serde_json::json;
 use std::io;
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::atomic::Ordering;
+use std::thread::sleep;
 use std::time::{Duration, Instant};
+
+/// How often it is looked whether an end is asked for.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// Where the robot is, and how to show it.
 #[derive(Debug, Args)]
@@ -31,20 +36,14 @@ pub struct MonitorArgs {
 /// Shows every second what the robot has done.
 ///
 /// # Errors
-/// [`BadInput`] if there is no such robot, or it goes away.
-pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<()> {
+/// If there is no such robot, it goes away, or what it reports is impossible.
+pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
     let seconds = match &arguments.seconds {
         None => u32::MAX,
         Some(text) => flag("for", text, |text| count(text, u32::MAX))?,
     };
-    let (port, baud) = arguments.port.checked()?;
-    let (stop, stopped) = channel();
-    on_signal(move || {
-        // A second Ctrl-C has nobody left to tell.
-        let _ = stop.send(());
-    })?;
-    let mut robot = Robot::connect(&port, baud).map_err(BadInput::new)?;
-    tell!("{port}: {}", robot.identity());
+    let port = arguments.port.name();
+    let mut robot = arguments.port.connect()?;
     let show = if arguments.json {
         Show::Json
     } else if output::stdout_is_screen() {
@@ -54,14 +53,20 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<()> {
     };
     let started = Instant::now();
     let mut before = None;
+    let mut exit = Exit::Done;
     for second in 0..=u64::from(seconds) {
         let next = started + Duration::from_secs(second);
-        let left = next.saturating_duration_since(Instant::now());
-        match stopped.recv_timeout(left) {
-            Err(RecvTimeoutError::Timeout) => {}
-            _ => break,
+        while Instant::now() < next && !stop().load(Ordering::Relaxed) {
+            sleep(LOOK.min(next.saturating_duration_since(Instant::now())));
         }
-        let Some((report, line)) = robot.telemetry().map_err(BadInput::new)? else {
+        let told = match robot.telemetry() {
+            Err(error) if matches!(error.problem, Problem::Interrupted { .. }) => {
+                exit = Exit::Interrupted;
+                break;
+            }
+            told => told.map_err(failed)?,
+        };
+        let Some((report, line)) = told else {
             tell!("{port}: it was restarted; {}", robot.identity());
             before = None;
             continue;
@@ -76,7 +81,7 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<()> {
             };
             match show.sample(&sample) {
                 // Whoever read this has seen enough.
-                Err(error) if output::is_gone(&error) => return Ok(()),
+                Err(error) if output::is_gone(&error) => return Ok(Exit::Done),
                 shown => shown?,
             }
         }
@@ -85,17 +90,7 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<()> {
     if matches!(show, Show::OneLine) {
         show!("\n");
     }
-    Ok(())
-}
-
-/// What happened between two reports; none if the counts began anew.
-fn since(before: Surprise, now: Surprise) -> Option<Surprise> {
-    Some(Surprise {
-        mispredicted_bits: now
-            .mispredicted_bits
-            .checked_sub(before.mispredicted_bits)?,
-        seen_bits: now.seen_bits.checked_sub(before.seen_bits)?,
-    })
+    Ok(exit)
 }
 
 /// Share of bits mispredicted; none before the first.

@@ -6,20 +6,14 @@ use minimal_surprise_link::Refusal;
 
 /// A port, and what is wrong with it or with what is behind it.
 #[derive(Debug, thiserror::Error)]
-#[error("--port = {port}: {problem}")]
+#[error("--port = {port}: {problem}{}", left.as_ref().map_or(String::new(), |left| format!("; {left}")))]
 pub struct RobotError {
     /// The port.
     pub port: PortName,
     /// What is wrong.
     pub problem: Problem,
-}
-
-impl RobotError {
-    /// Whether the robot is there and has only said no.
-    #[must_use]
-    pub fn is_refusal(&self) -> bool {
-        matches!(self.problem, Problem::Refused { .. })
-    }
+    /// How the robot is left and what to do about it, if not as it was found.
+    pub left: Option<String>,
 }
 
 /// What is wrong.
@@ -31,32 +25,41 @@ pub enum Problem {
         /// The ports that there are.
         ports: Vec<String>,
     },
-    /// A file or a folder has this name.
-    #[error("a file or folder, not a serial port; {}", present(ports))]
+    /// A file, a folder or another device has this name.
+    #[error("a file, folder or device that is no serial port; {}", present(ports))]
     NotAPort {
         /// The ports that there are.
         ports: Vec<String>,
     },
+    /// Another program has it.
+    #[error("the port is in use by another program; close that first")]
+    InUse,
     /// The operating system does not give it.
     #[error("the port cannot be opened: {0}")]
     NotOpened(serialport::Error),
     /// Not a byte has come.
     #[error(
-        "silence for {seconds:.1} s; expected a robot that is switched on, at {baud} baud (--baud)"
+        "silence for {seconds:.1} s; expected a robot that is switched on, at {baud} baud (--baud){reader}{RESTARTS}"
     )]
     Silent {
         /// How long it was waited for.
         seconds: f64,
         /// The speed.
         baud: u32,
+        /// Who else may have read what came.
+        reader: OtherReader,
     },
     /// Something has come, but nothing that a robot says.
-    #[error("another device is talking: {heard}; expected a robot at {baud} baud (--baud)")]
+    #[error(
+        "another device is talking: {heard}; expected a robot at {baud} baud (--baud){reader}{RESTARTS}"
+    )]
     OtherDevice {
         /// What was heard.
         heard: Heard,
         /// The speed.
         baud: u32,
+        /// Who else may have read what came.
+        reader: OtherReader,
     },
     /// The robot computes differently.
     #[error("the robot is kernel {robot}, this program is kernel {KERNEL_ID}; update one of them")]
@@ -73,8 +76,16 @@ pub enum Problem {
         error: std::io::Error,
     },
     /// The robot has answered before, and does no longer.
-    #[error("no answer any more, while the robot was {doing}{}", doing.consequence())]
+    #[error("no answer any more, while the robot was {doing}{}{reader}", doing.consequence())]
     Unanswered {
+        /// What was going on.
+        doing: Doing,
+        /// Who else may have read what came.
+        reader: OtherReader,
+    },
+    /// The user has asked for an end.
+    #[error("interrupted while the robot was {doing}{}", doing.consequence())]
+    Interrupted {
         /// What was going on.
         doing: Doing,
     },
@@ -92,12 +103,40 @@ pub enum Problem {
         /// What was going on.
         doing: Doing,
     },
+    /// Numbers that no robot can have.
+    #[error("the robot reports impossible {what}")]
+    Impossible {
+        /// Which, and why.
+        what: String,
+    },
     /// It says that it has done it, and has not.
     #[error("the robot confirmed the genome, but runs {runs}; run the command again")]
     NotInUse {
         /// What it runs.
         runs: String,
     },
+}
+
+/// Ends a message about a robot that has not answered yet.
+const RESTARTS: &str =
+    "; a board that restarts when its port is opened may need longer, as with --wait 10";
+
+/// Another program that reads the same port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OtherReader {
+    /// There may be one.
+    Possible,
+    /// Bytes had arrived, and were gone when they were to be read.
+    Certain,
+}
+
+impl std::fmt::Display for OtherReader {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Possible => "; another program may be reading the port",
+            Self::Certain => "; another program is reading the port: close that first",
+        })
+    }
 }
 
 /// What a robot is asked to do.

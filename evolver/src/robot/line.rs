@@ -1,15 +1,22 @@
 //! One serial port, and one question after another over it.
 
-use super::error::{Doing, Heard, Problem, RobotError};
+use super::error::{Doing, Heard, OtherReader, Problem, RobotError};
 use minimal_surprise_link::{Client, MalformedMessage, Refusal, Reply, Request};
 use serialport::SerialPort;
 use std::fmt;
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, ErrorKind};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 /// Longest that sending a request may take; at 9,600 baud the longest takes 160 ms.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
+/// Pause before a port is tried again that was ready and then was not.
+const PAUSE: Duration = Duration::from_millis(1);
+
+/// For what is not to be interrupted.
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// How a user names a port.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,41 +38,65 @@ pub(super) struct Line {
     received: u64,
     /// Whether an answer has ever come.
     answered: bool,
+    /// Whether bytes that had come were gone when they were to be read.
+    shared: bool,
+    /// Set when questions are to end.
+    stop: &'static AtomicBool,
 }
 
 impl Line {
-    /// Opens the port; says nothing yet.
-    pub(super) fn open(name: &PortName, baud: u32) -> Result<Self, RobotError> {
+    /// Opens the port; says nothing yet. The first question is asked for as long as `wait`, and no
+    /// question is asked any more when `stop` is set.
+    pub(super) fn open(
+        name: &PortName,
+        baud: u32,
+        wait: Duration,
+        stop: &'static AtomicBool,
+    ) -> Result<Self, RobotError> {
         let about = |problem| RobotError {
             port: name.clone(),
             problem,
+            left: None,
         };
         let path = Path::new(&name.0);
         if path.is_file() || path.is_dir() {
             return Err(about(Problem::NotAPort { ports: ports() }));
         }
-        let opened = serialport::new(&name.0, baud).timeout(SEND_TIMEOUT).open();
-        let port = opened.map_err(|error| {
+        let port = open_port(&name.0, baud).map_err(|error| {
             about(match error.kind {
                 serialport::ErrorKind::Io(ErrorKind::NotFound) => {
                     Problem::NoSuchPort { ports: ports() }
                 }
+                // Also said on Windows of a port that is not there.
+                serialport::ErrorKind::NoDevice if cfg!(unix) => Problem::InUse,
+                serialport::ErrorKind::Unknown if is_another_device(path) => {
+                    Problem::NotAPort { ports: ports() }
+                }
                 _ => Problem::NotOpened(error),
             })
         })?;
+        let patience = Request::Identify.timeout_ms().into();
+        let attempts = wait.as_millis().div_ceil(patience) as u32 + 1;
         Ok(Self {
             name: name.clone(),
             baud,
             port,
-            client: new_client(),
+            client: Client::new(rand::random(), attempts),
             received: 0,
             answered: false,
+            shared: false,
+            stop,
         })
+    }
+
+    /// From here on nothing is interrupted.
+    pub(super) fn finish(&mut self) {
+        self.stop = &NEVER;
     }
 
     /// Begins another conversation.
     pub(super) fn start_over(&mut self) {
-        self.client = new_client();
+        self.client = Client::new(rand::random(), Client::ATTEMPTS_MAX);
         self.received = 0;
     }
 
@@ -87,6 +118,9 @@ impl Line {
             }
         };
         loop {
+            if self.stop.load(Ordering::Relaxed) {
+                return Err(self.about(Problem::Interrupted { doing }));
+            }
             self.send(doing, &bytes)?;
             let deadline = Instant::now() + patience;
             let mut buffer = [0; 256];
@@ -118,14 +152,19 @@ impl Line {
         RobotError {
             port: self.name.clone(),
             problem,
+            left: None,
         }
     }
 
     /// Why there was no answer.
     fn silence(&self, doing: Doing, waited: Duration) -> Problem {
         let baud = self.baud;
+        let reader = match self.shared {
+            true => OtherReader::Certain,
+            false => OtherReader::Possible,
+        };
         let heard = match self.client.last_malformed() {
-            _ if self.answered => return Problem::Unanswered { doing },
+            _ if self.answered => return Problem::Unanswered { doing, reader },
             Some(MalformedMessage::WrongWay) => Heard::Echo,
             Some(MalformedMessage::OtherVersion { found }) => Heard::OtherVersion { found },
             Some(MalformedMessage::NotAMessage) => Heard::Frames,
@@ -134,23 +173,31 @@ impl Line {
             },
             None => {
                 let seconds = waited.as_secs_f64();
-                return Problem::Silent { seconds, baud };
+                return Problem::Silent {
+                    seconds,
+                    baud,
+                    reader,
+                };
             }
         };
-        Problem::OtherDevice { heard, baud }
+        Problem::OtherDevice {
+            heard,
+            baud,
+            reader,
+        }
     }
 
-    fn send(&mut self, doing: Doing, bytes: &[u8]) -> Result<(), RobotError> {
-        let sent = self
-            .port
-            .set_timeout(SEND_TIMEOUT)
-            .map_err(io::Error::from)
-            .and_then(|()| self.port.write_all(bytes));
-        match sent {
-            // A line that takes nothing is one that does not answer either.
-            Err(error) if error.kind() != ErrorKind::TimedOut => Err(self.broken(doing, error)),
-            _ => Ok(()),
+    fn send(&mut self, doing: Doing, mut bytes: &[u8]) -> Result<(), RobotError> {
+        let deadline = Instant::now() + SEND_TIMEOUT;
+        while !bytes.is_empty() {
+            match self.by(deadline, |port| port.write(bytes)) {
+                Ok(Some(count)) => bytes = &bytes[count..],
+                // A line that takes nothing is one that does not answer either.
+                Ok(None) => break,
+                Err(error) => return Err(self.broken(doing, error)),
+            }
         }
+        Ok(())
     }
 
     /// Bytes that have come; none at the deadline.
@@ -160,24 +207,34 @@ impl Line {
         deadline: Instant,
         buffer: &mut [u8],
     ) -> Result<Option<usize>, RobotError> {
+        let mut gone = false;
+        let read = self.by(deadline, |port| {
+            let read = port.read(buffer);
+            gone |= is_not_ready(&read);
+            read
+        });
+        self.shared |= gone;
+        read.map_err(|error| self.broken(doing, error))
+    }
+
+    /// Reads or writes as soon as that can be done; none at the deadline.
+    fn by(
+        &mut self,
+        deadline: Instant,
+        mut transfer: impl FnMut(&mut dyn SerialPort) -> io::Result<usize>,
+    ) -> io::Result<Option<usize>> {
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return Ok(None);
             }
-            let read = self
-                .port
-                .set_timeout(left)
-                .map_err(io::Error::from)
-                .and_then(|()| self.port.read(buffer));
-            match read {
-                Ok(0) => return Err(self.broken(doing, ErrorKind::UnexpectedEof.into())),
+            self.port.set_timeout(left)?;
+            match transfer(&mut *self.port) {
+                transferred if is_not_ready(&transferred) => sleep(PAUSE),
                 Ok(count) => return Ok(Some(count)),
-                Err(error) => match error.kind() {
-                    ErrorKind::TimedOut => return Ok(None),
-                    ErrorKind::Interrupted => {}
-                    _ => return Err(self.broken(doing, error)),
-                },
+                Err(error) if error.kind() == ErrorKind::TimedOut => return Ok(None),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
             }
         }
     }
@@ -187,8 +244,52 @@ impl Line {
     }
 }
 
-fn new_client() -> Client {
-    Client::new(rand::random(), Client::ATTEMPTS_MAX)
+/// Whether a port that was ready has taken and given nothing. A line that was pulled does the same
+/// and is then not ready but broken.
+fn is_not_ready(transferred: &io::Result<usize>) -> bool {
+    match transferred {
+        Ok(count) => *count == 0,
+        Err(error) => error.kind() == ErrorKind::WouldBlock,
+    }
+}
+
+/// A port that never waits in a read or a write, only before it: where a byte has arrived, another
+/// program may be quicker, and then waiting for the next one has no limit.
+#[cfg(unix)]
+fn open_port(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
+    let port = serialport::new(name, baud).open_native()?;
+    // The setting is that of the open file, which the duplicate shares.
+    let set = filedescriptor::FileDescriptor::dup(&port)
+        .and_then(|mut duplicate| duplicate.set_non_blocking(true));
+    match set {
+        Ok(()) => Ok(Box::new(port)),
+        Err(error) => {
+            let kind = serialport::ErrorKind::Io(ErrorKind::Other);
+            Err(serialport::Error::new(kind, error.to_string()))
+        }
+    }
+}
+
+/// Whether what has this name is there and is no terminal line.
+#[cfg(unix)]
+fn is_another_device(path: &Path) -> bool {
+    use nix::libc::{O_NOCTTY, O_NONBLOCK};
+    use std::io::IsTerminal;
+    use std::os::unix::fs::OpenOptionsExt;
+    let mut options = std::fs::OpenOptions::new();
+    options.read(true).custom_flags(O_NOCTTY | O_NONBLOCK);
+    options.open(path).is_ok_and(|file| !file.is_terminal())
+}
+
+#[cfg(not(unix))]
+fn is_another_device(_: &Path) -> bool {
+    false
+}
+
+/// A port whose reads and writes have a time limit.
+#[cfg(not(unix))]
+fn open_port(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
+    serialport::new(name, baud).timeout(SEND_TIMEOUT).open()
 }
 
 /// Whether the robot has lost the conversation.

@@ -3,17 +3,23 @@
 //! Here are the port, the clock and the retries that [`minimal_surprise_link`] leaves to the host.
 
 mod error;
+mod held;
 mod line;
+mod plausible;
 
-pub use error::{Doing, Heard, Problem, RobotError};
+pub use error::{Doing, Heard, OtherReader, Problem, RobotError};
+pub use held::{Afterwards, standing};
 pub use line::PortName;
 
 use line::{Line, is_lost_session};
-use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits};
+use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Surprise};
 use minimal_surprise_link::{
     CHUNK_BYTES_MAX, Faults, GenomeInUse, LineCounters, Reply, Report, Request, Stepped,
 };
+use plausible::{check_identity, check_report, check_surprise};
 use std::fmt;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// Who the robot is and what it runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -69,7 +75,11 @@ pub fn fault_names(faults: Faults) -> Vec<&'static str> {
     let set = names
         .into_iter()
         .filter(|&(fault, _)| faults.contains(fault));
-    set.map(|(_, name)| name).collect()
+    let unknown = names
+        .iter()
+        .fold(faults.0, |bits, (fault, _)| bits & !fault.0);
+    let unknown = (unknown != 0).then_some("a fault unknown to this program");
+    set.map(|(_, name)| name).chain(unknown).collect()
 }
 
 /// Length and CRC of a container, as a robot names the genome in use; none of bytes that cannot be
@@ -94,17 +104,37 @@ pub fn is_in_use(genome: GenomeInUse, container: &[u8]) -> bool {
 pub struct Robot {
     line: Line,
     identity: Identity,
+    /// Steps asked for since the last reset.
+    steps: u64,
+    /// What it reported last in this conversation.
+    reported: Option<Surprise>,
 }
 
 impl Robot {
-    /// Opens the port and asks who is there.
+    /// Opens the port and asks who is there, for as long as `wait`. When `stop` is set, the robot is
+    /// asked nothing more, except to be put back as it was found.
     ///
     /// # Errors
     /// [`RobotError`] if there is no such port, nobody answers, or somebody else does.
-    pub fn connect(port: &PortName, baud: u32) -> Result<Self, RobotError> {
-        let mut line = Line::open(port, baud)?;
+    pub fn connect(
+        port: &PortName,
+        baud: u32,
+        wait: Duration,
+        stop: &'static AtomicBool,
+    ) -> Result<Self, RobotError> {
+        let mut line = Line::open(port, baud, wait, stop)?;
         let identity = identify(&mut line)?;
-        Ok(Self { line, identity })
+        Ok(Self {
+            line,
+            identity,
+            steps: 0,
+            reported: None,
+        })
+    }
+
+    /// From here on nothing is interrupted.
+    fn finish(&mut self) {
+        self.line.finish();
     }
 
     /// What it said when it was asked last.
@@ -119,6 +149,7 @@ impl Robot {
     /// [`RobotError`].
     pub fn identify(&mut self) -> Result<&Identity, RobotError> {
         self.line.start_over();
+        self.reported = None;
         self.identity = identify(&mut self.line)?;
         Ok(&self.identity)
     }
@@ -137,7 +168,8 @@ impl Robot {
     }
 
     /// Writes a genome into the slot that is not in use and has the robot run it, calling `written`
-    /// with the bytes that it has. The robot has to stand.
+    /// with the bytes that it has. The robot has to stand. It may be interrupted until the genome is
+    /// complete.
     ///
     /// # Errors
     /// [`RobotError`]; the robot then has the genome that it had, except after
@@ -159,10 +191,11 @@ impl Robot {
             offset += data.len() as u16;
             written(offset.into());
         }
+        self.finish();
         let committed = self
             .line
             .ask(Doing::Committing, &Request::Commit, |reply| match reply {
-                Reply::Committed { write_count } => Some(write_count),
+                Reply::Committed { .. } => Some(()),
                 _ => None,
             });
         match committed {
@@ -204,20 +237,25 @@ impl Robot {
     /// # Errors
     /// [`RobotError`].
     pub fn reset(&mut self) -> Result<(), RobotError> {
+        self.steps = 0;
         self.done(Doing::Switching, &Request::Reset)
     }
 
-    /// One control step with these readings. The robot has to stand.
+    /// One control step with these readings. The robot has to stand and to have been reset.
     ///
     /// # Errors
     /// [`RobotError`].
     pub fn step(&mut self, sensors: SensorBits) -> Result<Stepped, RobotError> {
         let request = Request::Step { sensors };
-        self.line
+        let stepped = self
+            .line
             .ask(Doing::Stepping, &request, |reply| match reply {
                 Reply::Stepped(stepped) => Some(stepped),
                 _ => None,
-            })
+            })?;
+        self.steps += 1;
+        self.possible(check_surprise(stepped.surprise, Some(self.steps)))?;
+        Ok(stepped)
     }
 
     /// How it is going; none if the robot was restarted since it was asked last.
@@ -236,8 +274,23 @@ impl Robot {
                 self.identify()?;
                 Ok(None)
             }
-            told => told.map(Some),
+            told => {
+                let (report, line) = told?;
+                self.possible(check_report(&report))?;
+                if let Some(recent) = self
+                    .reported
+                    .and_then(|before| since(before, report.surprise))
+                {
+                    self.possible(check_surprise(recent, None))?;
+                }
+                self.reported = Some(report.surprise);
+                Ok(Some((report, line)))
+            }
         }
+    }
+
+    fn possible(&self, checked: Result<(), String>) -> Result<(), RobotError> {
+        checked.map_err(|what| self.line.about(Problem::Impossible { what }))
     }
 
     /// Asks for something of which nothing is to be said but that it is done.
@@ -247,21 +300,33 @@ impl Robot {
     }
 }
 
+/// What happened between two reports; none if the counts began anew.
+#[must_use]
+pub fn since(before: Surprise, now: Surprise) -> Option<Surprise> {
+    Some(Surprise {
+        mispredicted_bits: now
+            .mispredicted_bits
+            .checked_sub(before.mispredicted_bits)?,
+        seen_bits: now.seen_bits.checked_sub(before.seen_bits)?,
+    })
+}
+
 fn identify(line: &mut Line) -> Result<Identity, RobotError> {
-    line.ask(
+    let identity = line.ask(
         Doing::Identifying,
         &Request::Identify,
         |reply| match reply {
-            Reply::Identity(identity) => Some(Identity {
+            Reply::Identity(identity) => Some(check_identity(&identity).map(|()| Identity {
                 firmware: printable(identity.firmware, identity.version),
                 kernel: identity.kernel,
                 genome: identity.genome,
                 running: identity.running,
                 faults: identity.faults,
-            }),
+            })),
             _ => None,
         },
-    )
+    )?;
+    identity.map_err(|what| line.about(Problem::Impossible { what }))
 }
 
 /// Name and version without what a terminal would take for commands.

@@ -1,0 +1,84 @@
+//! The robot on a serial port, as commands use it.
+
+use super::evaluate::flag;
+use super::{BadInput, Interrupted};
+use crate::exit::Exit;
+use crate::report::summary::{program, shell_word};
+use crate::robot::{PortName, Problem, Robot, RobotError, standing};
+use crate::settings::count;
+use crate::signals::{ask_to_stop, on_signal, stop};
+use clap::Args;
+use std::path::Path;
+use std::time::Duration;
+
+/// Speed of the line unless told otherwise.
+const BAUD: &str = "115200";
+
+/// Where a robot is.
+#[derive(Debug, Args)]
+pub struct PortArgs {
+    /// The serial port that the robot is on, as in /dev/ttyACM0 or COM3.
+    #[arg(long, value_name = "PORT")]
+    port: String,
+    /// Speed of the line, in bits a second.
+    #[arg(long, value_name = "N", default_value = BAUD, allow_hyphen_values = true)]
+    baud: String,
+    /// Ask for this long until the robot answers: for boards that restart when the port is opened.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value = "2",
+        allow_hyphen_values = true
+    )]
+    wait: String,
+}
+
+impl PortArgs {
+    /// The port's name.
+    pub(super) fn name(&self) -> &str {
+        &self.port
+    }
+
+    /// Checks the flags and connects. From here on the first signal ends what the command does with
+    /// the robot, and the second ends the program.
+    pub(super) fn connect(&self) -> anyhow::Result<Robot> {
+        let baud = flag("baud", &self.baud, |text| count(text, 12_000_000))?;
+        let wait = flag("wait", &self.wait, |text| count(text, 3600))?;
+        let mut asked = false;
+        on_signal(move || {
+            if asked {
+                if let Some(words) = standing() {
+                    tell!("{words}");
+                }
+                Exit::Interrupted.now();
+            }
+            asked = true;
+            ask_to_stop();
+            tell!("\nending; Ctrl-C again ends at once");
+        })?;
+        let port = PortName(self.port.clone());
+        let wait = Duration::from_secs(wait.into());
+        let robot = Robot::connect(&port, baud, wait, stop()).map_err(failed)?;
+        tell!("{port}: {}", robot.identity());
+        Ok(robot)
+    }
+
+    /// The line that runs another command on the same port.
+    pub(super) fn command(&self, command: &str) -> String {
+        let port = shell_word(Path::new(&self.port));
+        let line = format!("{} {command} --port {port}", program());
+        match self.baud.as_str() {
+            BAUD => line,
+            baud => format!("{line} --baud {baud}"),
+        }
+    }
+}
+
+/// What a command ends with after an error of port or robot.
+pub(super) fn failed(error: RobotError) -> anyhow::Error {
+    match error.problem {
+        Problem::NoSuchPort { .. } | Problem::NotAPort { .. } => BadInput::new(error).into(),
+        Problem::Interrupted { .. } => Interrupted(error.to_string()).into(),
+        _ => error.into(),
+    }
+}

@@ -1,0 +1,31 @@
+//! `evolver start` and `evolver stop`: a robot runs its control loop, or stands.
+
+use super::port::{PortArgs, failed};
+
+/// Starts the robot.
+///
+/// # Errors
+/// If there is no such robot, or it refuses.
+pub fn start(arguments: &PortArgs) -> anyhow::Result<()> {
+    switch(arguments, true)
+}
+
+/// Stops the robot.
+///
+/// # Errors
+/// If there is no such robot, or it refuses.
+pub fn stop(arguments: &PortArgs) -> anyhow::Result<()> {
+    switch(arguments, false)
+}
+
+fn switch(arguments: &PortArgs, runs: bool) -> anyhow::Result<()> {
+    let mut robot = arguments.connect()?;
+    let switched = match runs {
+        true => robot.start(),
+        false => robot.stop(),
+    };
+    switched.map_err(failed)?;
+    let identity = robot.identify().map_err(failed)?;
+    show_line!("{}: {identity}", arguments.name());
+    Ok(())
+}
