@@ -9,6 +9,7 @@ use crate::noise::NoiseStream;
 use crate::torus::{Grid, Heading, Pose};
 use minimal_surprise_controller::sensor::MAX_SENSORS;
 use minimal_surprise_controller::{Action, Controller, Decision, SensorBits, SensorModel, State};
+use std::collections::HashMap;
 
 /// How far a robot senses, in cells: the width of the border around the board.
 const REACH: usize = 2;
@@ -47,17 +48,27 @@ pub enum WorldError {
 /// # Errors
 /// [`WorldError`] names the first robot that is wrong.
 pub fn check_poses(grid: Grid, poses: &[Pose]) -> Result<(), WorldError> {
-    let mut taken = vec![false; grid.cells() as usize];
+    // Memory and time go with the robots: a file of few robots may name any grid.
+    let mut cells = Vec::with_capacity(poses.len());
     for (robot, &Pose { x, y, .. }) in poses.iter().enumerate() {
         if x >= grid.width() || y >= grid.height() {
+            check_overlap(grid, &poses[..robot], &mut cells)?;
             return Err(WorldError::OutsideGrid { robot, x, y, grid });
         }
-        let cell = &mut taken[grid.cell(x, y) as usize];
-        if core::mem::replace(cell, true) {
-            let other = poses
-                .iter()
-                .position(|pose| pose.x == x && pose.y == y)
-                .unwrap_or(robot);
+        cells.push(grid.cell(x, y));
+    }
+    check_overlap(grid, poses, &mut cells)
+}
+
+/// Checks that no two robots share a cell; `cells` are theirs and are sorted.
+fn check_overlap(grid: Grid, poses: &[Pose], cells: &mut [u32]) -> Result<(), WorldError> {
+    cells.sort_unstable();
+    if cells.is_sorted_by(|a, b| a < b) {
+        return Ok(());
+    }
+    let mut taken = HashMap::with_capacity(poses.len());
+    for (robot, &Pose { x, y, .. }) in poses.iter().enumerate() {
+        if let Some(other) = taken.insert(grid.cell(x, y), robot) {
             return Err(WorldError::Overlap { robot, other, x, y });
         }
     }

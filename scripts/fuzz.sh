@@ -1,0 +1,38 @@
+#!/bin/sh
+# Every target of tests/fuzz guided by coverage: scripts/fuzz.sh [SECONDS [TARGET...]]
+#
+# Starts from tests/fuzz-corpus, each target for 300 seconds unless told otherwise, as many at a
+# time as there are cores. An input that a reader fails on is left there as found-..., to be
+# committed with the correction. Needs a C++ compiler, since libFuzzer is C++; no nightly Rust. There
+# is no address sanitizer, since no reader has unsafe code.
+set -eu
+cd "$(dirname "$0")/.."
+
+if ! command -v c++ >/dev/null && ! scripts/apt-install.sh g++; then
+    echo 'fuzz.sh: no C++ compiler, so no target is guided by coverage' >&2
+    [ "${CI:-}" != true ]
+    exit
+fi
+
+seconds=${1:-300}
+[ $# = 0 ] || shift
+[ $# != 0 ] || set -- $(ls tests/fuzz-corpus)
+
+host=$(rustc -vV | sed -n 's/^host: //p')
+coverage='-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
+    -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table
+    -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1'
+# With --target, build scripts and macros are built without all this.
+RUSTFLAGS="$coverage -Cdebug-assertions" cargo build --locked --release \
+    --manifest-path fuzz/Cargo.toml --target "$host"
+
+# shellcheck disable=SC2016 # for the inner shell
+printf '%s\n' "$@" | xargs -P "$(getconf _NPROCESSORS_ONLN)" -I TARGET sh -c '
+    grown=fuzz/target/corpus/$1 log=fuzz/target/$1.log
+    mkdir -p "$grown"
+    if FUZZ_TARGET=$1 "fuzz/target/$2/release/readers" "$grown" "tests/fuzz-corpus/$1" \
+        -max_total_time="$3" -timeout=20 -rss_limit_mb=1024 -max_len=65536 -verbosity=1 \
+        -print_final_stats=1 -artifact_prefix="tests/fuzz-corpus/$1/found-" >"$log" 2>&1
+    then echo "$1: $(sed -n "s/^stat::number_of_executed_units: *//p" "$log") inputs"
+    else echo "$1 failed:" && tail -n 40 "$log" && exit 1
+    fi' sh TARGET "$host" "$seconds"

@@ -1,0 +1,108 @@
+//! Every reader of foreign bytes, with the corpus in `fuzz-corpus` and with mutants of it.
+//!
+//! The corpus is a folder a target: seeds, and as `found-…` every input that a reader once failed
+//! on. `UPDATE_CORPUS=1` writes the seeds anew. `scripts/fuzz.sh` has the same targets guided by
+//! coverage.
+
+mod mutation;
+mod seeds;
+mod targets;
+
+use minimal_surprise_controller::codec::CRC_32C;
+use std::fs;
+use std::panic::catch_unwind;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use targets::{TARGETS, Target, check, tests_folder};
+
+/// How long a target is tried with mutants: as many as there is time for. It decides nothing.
+const TIME: Duration = Duration::from_secs(5);
+/// Mutants of a series are the same everywhere.
+const SERIES: u64 = 1;
+
+fn corpus(name: &str) -> PathBuf {
+    tests_folder().join("fuzz-corpus").join(name)
+}
+
+/// The inputs of a target's corpus, by their names.
+fn inputs(name: &str) -> Vec<(PathBuf, Vec<u8>)> {
+    let files = fs::read_dir(corpus(name)).unwrap_or_else(|_| panic!("{name} has no corpus"));
+    let mut paths: Vec<PathBuf> = files.map(|file| file.unwrap().path()).collect();
+    paths.sort();
+    let read = |path: PathBuf| (path.clone(), fs::read(path).unwrap());
+    paths.into_iter().map(read).collect()
+}
+
+/// Runs a target; a failure leaves its input behind, to be committed with the correction.
+fn run(target: Target, bytes: &[u8], origin: &str) -> bool {
+    catch_unwind(|| check(target, bytes)).unwrap_or_else(|_| {
+        let name = format!("found-{:08x}", CRC_32C.checksum(bytes));
+        let path = corpus(target.0).join(name);
+        fs::write(&path, bytes).unwrap();
+        let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        panic!("{}, {origin}: kept as {}\n{hex}", target.0, path.display());
+    })
+}
+
+fn any_bytes_are_read_or_refused(name: &str) {
+    let target = *TARGETS.iter().find(|target| target.0 == name).unwrap();
+    let inputs = inputs(name);
+    let accepted =
+        |(path, bytes): &&(PathBuf, Vec<u8>)| run(target, bytes, &path.to_string_lossy());
+    let accepted = inputs.iter().filter(accepted).count();
+    assert!(
+        accepted > 0,
+        "{name} accepts none of its seeds: UPDATE_CORPUS=1"
+    );
+    let seeds: Vec<Vec<u8>> = inputs.into_iter().map(|(_, bytes)| bytes).collect();
+    let (start, mut accepted) = (Instant::now(), 0);
+    let mut number = 0;
+    while start.elapsed() < TIME {
+        let bytes = mutation::mutant(&seeds, SERIES, number);
+        accepted += u64::from(run(target, &bytes, &format!("mutant {number}")));
+        number += 1;
+    }
+    println!("{name}: {number} mutants of series {SERIES}, {accepted} of them accepted");
+}
+
+macro_rules! fuzz {
+    ($($test:ident $target:literal;)*) => {
+        $(#[test] fn $test() { any_bytes_are_read_or_refused($target); })*
+
+        #[test]
+        fn every_target_has_a_test_and_a_corpus_and_all_corpora_are_small() {
+            let names = TARGETS.map(|(name, _)| name);
+            assert_eq!(names, [$($target),*]);
+            if std::env::var_os("UPDATE_CORPUS").is_some() {
+                for (target, name, bytes) in seeds::seeds() {
+                    fs::create_dir_all(corpus(target)).unwrap();
+                    fs::write(corpus(target).join(name), bytes).unwrap();
+                }
+            }
+            let inputs = names.into_iter().flat_map(inputs);
+            let bytes: usize = inputs.map(|(_, bytes)| bytes.len()).sum();
+            assert!(bytes < 300_000, "{bytes} bytes");
+        }
+    };
+}
+
+fuzz! {
+    any_bytes_are_a_genome_or_refused "genome";
+    any_bytes_are_a_checkpoint_or_refused "checkpoint";
+    any_config_is_read_or_refused_with_its_run "run-config";
+    any_meta_is_read_or_refused_with_its_run "run-meta";
+    any_table_of_generations_is_read_or_refused_with_its_run "run-generations";
+    any_genome_is_read_or_refused_with_its_run "run-genome";
+    any_time_is_read_or_refused_with_its_run "run-time";
+    any_final_state_is_read_or_refused_with_its_run "run-final";
+    any_mark_is_read_or_refused_with_its_run "run-done";
+    any_bytes_are_settings_or_refused "settings";
+    any_bytes_are_a_suite_or_refused "suite";
+    any_bytes_are_a_trajectory_or_refused "trajectory";
+    any_bytes_are_agents_or_refused "agents";
+    any_bytes_are_a_genome_text_or_refused "genome-text";
+    any_bytes_are_a_drawing_or_refused "drawing";
+    any_bytes_to_a_robot_are_answered_once_or_dropped "link-robot";
+    any_bytes_to_a_host_are_the_reply_or_dropped "link-host";
+    any_flash_has_slots_that_can_be_written "slots";
+}
