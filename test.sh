@@ -142,6 +142,7 @@ cargo test --locked --workspace --all-features -- --show-output $without_slurm
 if [ -n "${TEST_ALL:-}" ]; then
     say 'every power cut after every power cut'
     cargo test --locked --release --package minimal-surprise-slots --test power_cuts -- --show-output
+    say 'every reader of foreign bytes, guided by coverage' && scripts/fuzz.sh
 fi
 
 if [ -n "${TEST_ALL:-}" ]; then

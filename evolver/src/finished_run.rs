@@ -443,7 +443,14 @@ impl FinishedRun {
         require(path, DONE)?;
         FILES.into_iter().try_for_each(|file| require(path, file))?;
         let mut given = Given::default();
-        given.file(&path.join("config.toml"))?;
+        let config = path.join("config.toml");
+        given.file(&config)?;
+        if let Some(missing) = given.missing() {
+            return Err(ReadRunError::Value {
+                path: config,
+                problem: format!("no {missing}, which every run records"),
+            });
+        }
         given.forget("from");
         let settings = Settings::resolve(&given, || 0)?;
         let genome_path = path.join("best.genome");

@@ -162,6 +162,17 @@ impl Given {
         Ok(())
     }
 
+    /// The first setting that every `config.toml` of a run holds and that was not given.
+    #[must_use]
+    pub fn missing(&self) -> Option<String> {
+        let defaults = Settings::resolve(&Self::default(), || 0).ok()?;
+        let always = toml::Table::try_from(&defaults.written).ok()?;
+        always
+            .into_iter()
+            .map(|(key, _)| key)
+            .find(|key| self.place(key).is_none())
+    }
+
     /// Takes a setting back.
     pub fn forget(&mut self, key: &str) {
         self.values.remove(key);
