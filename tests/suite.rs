@@ -10,6 +10,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use tests::disk::Disk;
 use tests::full;
 use tests::program::{Evolver, Finished};
 use tests::tools::{self, Missing};
@@ -483,41 +484,10 @@ fn a_file_in_the_way_of_a_suite_is_named() {
     assert!(run.stderr.contains("suite"), "{run:?}");
 }
 
-/// A file system of its own, as large as it is made; gone with this.
-struct SmallDisk(std::path::PathBuf);
-
-impl SmallDisk {
-    /// Only a privileged process gets one.
-    fn mounted_at(path: std::path::PathBuf, size: &str) -> Option<Self> {
-        fs::create_dir_all(&path).unwrap();
-        let mounted = Command::new("mount")
-            .args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"])
-            .arg(&path)
-            .output();
-        mounted
-            .is_ok_and(|output| output.status.success())
-            .then(|| Self(path))
-    }
-
-    fn remount(&self, option: &str) {
-        let mounted = Command::new("mount")
-            .args(["-o", &format!("remount,{option}")])
-            .arg(&self.0)
-            .status();
-        assert!(mounted.unwrap().success());
-    }
-}
-
-impl Drop for SmallDisk {
-    fn drop(&mut self) {
-        let _ = Command::new("umount").arg(&self.0).status();
-    }
-}
-
 #[test]
 fn a_suite_on_a_full_disk_says_so_and_goes_on_when_there_is_room() {
     let evolver = with_the_suite();
-    let Some(disk) = SmallDisk::mounted_at(evolver.folder().join("suite"), "112k") else {
+    let Some(disk) = Disk::mounted_at(evolver.folder().join("suite"), "112k") else {
         println!("skipped: no file system can be mounted here");
         return;
     };
@@ -839,7 +809,7 @@ fn every_key_of_a_suite_is_explained() {
 #[test]
 fn a_suite_in_a_directory_that_is_read_only_says_so_and_what_is_done_can_be_read() {
     let evolver = with_the_suite();
-    let Some(disk) = SmallDisk::mounted_at(evolver.folder().join("suite"), "8m") else {
+    let Some(disk) = Disk::mounted_at(evolver.folder().join("suite"), "8m") else {
         println!("skipped: no file system can be mounted here");
         return;
     };

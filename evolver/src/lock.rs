@@ -28,8 +28,10 @@ pub enum LockError {
 /// Who holds a lock.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Holder {
-    host: String,
-    process: u32,
+    /// The name of its host.
+    pub host: String,
+    /// The number of its process there.
+    pub process: u32,
 }
 
 impl Lock {
@@ -98,11 +100,16 @@ impl Holder {
     }
 }
 
-/// As it is said after "held by".
 impl fmt::Display for Holder {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "process {} on {}", self.process, self.host)
     }
+}
+
+/// Who holds a lock, in words.
+#[must_use]
+pub fn named(holder: Option<&Holder>) -> String {
+    holder.map_or_else(|| "another process".to_owned(), Holder::to_string)
 }
 
 #[cfg(unix)]

@@ -56,6 +56,14 @@ impl NewDir {
         &self.part
     }
 
+    /// An error about a file in it, said of the place where the file was to be in the end.
+    pub fn in_place(&self, error: FileError) -> FileError {
+        match error.path.strip_prefix(&self.part) {
+            Ok(file) => FileError::at(&self.place.join(file))(error.error),
+            Err(_) => error,
+        }
+    }
+
     /// Puts it in its place, without the lock's file.
     ///
     /// # Errors

@@ -17,7 +17,7 @@ use crate::checkpoint::{self, CheckpointError};
 use crate::experiment::{Experiment, Finding};
 use crate::files::{self, DATA_BYTES_MAX, FileError, TEXT_BYTES_MAX};
 use crate::finished_run::{ReadRunError, complete};
-use crate::lock::{Holder, LOCK, Lock, LockError};
+use crate::lock::{self, Holder, LOCK, Lock, LockError};
 use crate::new_dir::NewDir;
 use crate::report::tables;
 use crate::settings::{Given, SettingError, Settings};
@@ -69,7 +69,7 @@ pub enum RunDirError {
     #[error(transparent)]
     Damaged(#[from] ReadRunError),
     /// Another process works on the run.
-    #[error("{} is in use by {}", path.display(), by(holder.as_ref()))]
+    #[error("{} is in use by {}", path.display(), lock::named(holder.as_ref()))]
     InUse {
         /// The directory.
         path: PathBuf,
@@ -145,10 +145,11 @@ impl RunDir {
             table_last: false,
             _lock: None,
         };
-        run.save(experiment)?;
         let meta = tables::meta(experiment.settings());
-        files::replace(&run.file(META), meta.as_bytes())?;
-        files::replace(&run.file(CONFIG), run.settings_text.as_bytes())?;
+        run.save(experiment)
+            .and_then(|()| files::replace(&run.file(META), meta.as_bytes()))
+            .and_then(|()| files::replace(&run.file(CONFIG), run.settings_text.as_bytes()))
+            .map_err(|error| new.in_place(error))?;
         // Under its own name from here on, complete: a directory of that name is always a run.
         run._lock = Some(new.publish_locked().map_err(exists_or_file)?);
         run.path = path.to_owned();
@@ -359,8 +360,4 @@ fn exists_or_file(error: FileError) -> RunDirError {
     } else {
         error.into()
     }
-}
-
-fn by(holder: Option<&Holder>) -> String {
-    holder.map_or_else(|| "another process".to_owned(), Holder::to_string)
 }

@@ -1,6 +1,7 @@
 //! What the integration tests share.
 
 pub mod browser;
+pub mod disk;
 pub mod firmware;
 pub mod genome;
 pub mod golden;

@@ -158,7 +158,8 @@ fn write(out: &Path, imported: &[(u32, ImportedGenome)]) -> anyhow::Result<()> {
         };
         let mut buffer = [0; CONTAINER_BYTES_MAX];
         let bytes = codec::encode(&imported.genome, provenance, &mut buffer)?;
-        files::create(&new.path().join(name(*generation)), bytes)?;
+        let file = new.path().join(name(*generation));
+        files::create(&file, bytes).map_err(|error| new.in_place(error))?;
     }
     new.publish().map_err(refused)
 }

@@ -1,10 +1,11 @@
 //! `evolver paper` and `evolver suite FILE`: many evolutions, on one machine or many.
 
 use super::evaluate::flag;
-use super::{BadInput, name_damaged, stopped, thread_pool};
+use super::{BadInput, Unfinished, name_damaged, stopped, thread_pool};
 use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
 use crate::files::{self, Existing};
+use crate::new_dir::remove_abandoned;
 use crate::replay::gallery;
 use crate::report::progress::ProgressMode;
 use crate::report::suite_progress::{SearchProgress, SuiteProgress, robot_steps};
@@ -12,10 +13,10 @@ use crate::report::summary::shell_word;
 use crate::run_dir::{Found, RunDir, RunDirError};
 use crate::settings::count;
 use crate::signals::stop_on_signal;
-use crate::suite::plan::{Plan, PlannedRun, Runs};
+use crate::suite::plan::{Plan, PlannedRun, RUNS, Runs};
 use crate::suite::report;
 use crate::suite::search::{Search, look};
-use crate::suite::work::{Progress, Shard, Worked, progress, work_on};
+use crate::suite::work::{Progress, Shard, Waiting, Worked, progress, work_on};
 use crate::suite::{PAPER, Resilience, Suite, slurm};
 use clap::{Args, Subcommand, ValueEnum};
 use minimal_surprise_sim::Path as CodePath;
@@ -23,10 +24,6 @@ use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
-
-/// How long a task waits until it looks again at runs that others hold.
-const LOOK_AGAIN: Duration = Duration::from_secs(1);
 
 /// A suite of one's own.
 #[derive(Debug, Args)]
@@ -550,11 +547,9 @@ fn print_searches(
 /// Which of the runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Share {
-    /// All, then those beyond the plan that experiments search through. Runs that other processes
-    /// hold are left to those.
+    /// All, then those beyond the plan that experiments search through.
     Whole,
-    /// One of several. Runs that others hold are waited for, or for their end: whoever started this
-    /// takes its success for the share's.
+    /// One of several.
     One(Shard),
 }
 
@@ -589,25 +584,18 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     let stop = stop_on_signal()?;
     let pool = thread_pool(threads)?;
     let mut damaged = DamagedRuns::default();
-    let worked = loop {
-        let worked =
-            pool.install(|| do_all(plan, runs, directory, manner.progress, stop, &mut damaged))?;
-        match worked {
-            Some(1..) if stop.load(Ordering::Relaxed) => break None,
-            Some(1..) if work.share != Share::Whole => std::thread::sleep(LOOK_AGAIN),
-            _ => break worked,
-        }
-    };
-    let mut searched = worked.is_some();
+    remove_abandoned(&directory.join(RUNS));
+    let mut worked =
+        pool.install(|| do_all(plan, runs, directory, manner.progress, stop, &mut damaged))?;
     for asked in to_search {
-        searched = searched
+        worked = worked
             && pool
                 .install(|| search(plan, asked, directory, manner.progress, stop, &mut damaged))?;
     }
-    let worked = worked.filter(|_| searched);
-    let Some(elsewhere) = worked else {
+    if !worked {
         return stopped("the same command");
-    };
+    }
+    // Looked at once, so that number and hash are of one moment.
     let mut hash = Sha256::new();
     let mut hashes = Vec::new();
     let mut done = 0;
@@ -621,6 +609,7 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     })?;
     let all_done = done == runs.number();
     if all_done && work.choice.is_whole() {
+        fs::create_dir_all(directory).map_err(files::FileError::at(directory))?;
         files::replace(&directory.join(shard.hashes_file()), &hashes)?;
     }
     // A share's would be one that no other number of shares gives.
@@ -641,12 +630,8 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
             })
         );
     } else {
-        let others = match elsewhere {
-            0 => String::new(),
-            n => format!("; {n} are being worked on by another process"),
-        };
         show_line!(
-            "{done} of {} runs done in {}{others}",
+            "{done} of {} runs done in {}",
             runs.number(),
             directory.display()
         );
@@ -656,6 +641,13 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
         if let Some(command) = search_by {
             show_line!("for a structure that no run formed, once all are done: {command}");
         }
+    }
+    if !all_done && damaged.is_empty() {
+        let gone = runs.number() - done;
+        return Err(Unfinished(format!(
+            "{gone} runs were removed while others were done; go on with: the same command"
+        ))
+        .into());
     }
     Ok(name_damaged(
         &damaged,
@@ -687,7 +679,7 @@ fn waits(run: &PlannedRun, suite: &Path, damaged: &mut DamagedRuns) -> bool {
     looked.is_some_and(|progress| progress != Progress::Done)
 }
 
-/// Does what is not done; the number of runs that others hold comes back, nothing if interrupted.
+/// Does what is not done, and waits for what other processes do; false if interrupted.
 fn do_all(
     plan: &Plan,
     runs: Runs<'_>,
@@ -695,41 +687,62 @@ fn do_all(
     mode: ProgressMode,
     stop: &AtomicBool,
     damaged: &mut DamagedRuns,
-) -> anyhow::Result<Option<usize>> {
-    let (mut waiting, mut to_work) = (0, 0_u64);
-    for run in runs.iter().filter(|run| waits(run, directory, damaged)) {
-        waiting += 1;
-        to_work = to_work.saturating_add(robot_steps(&run));
-    }
-    let shown = SuiteProgress::start(mode, plan, runs.number(), waiting, to_work);
-    let mut elsewhere = 0;
+) -> anyhow::Result<bool> {
+    let (mut to_do, mut to_work) = (Vec::new(), 0_u64);
     for run in runs.iter() {
-        if !waits(&run, directory, damaged) {
-            continue;
-        }
-        shown.begins(&run);
-        let worked = work_on(&run, directory, stop, |generation| {
-            shown.generation(&run, generation);
-        });
-        match worked {
-            Ok(Worked::Completed) => shown.completed(&run),
-            Ok(Worked::Elsewhere) => elsewhere += 1,
-            Ok(Worked::Interrupted) => {
-                shown.end();
-                return Ok(None);
-            }
-            // A disk that is full is not the fault of one run.
-            Err(error) if error.is_bad_input() => {
-                damaged.add(&run.directory(directory), error.cause());
-            }
-            Err(error) => {
-                shown.end();
-                return Err(error.into());
-            }
+        let waits = waits(&run, directory, damaged);
+        to_do.push(waits);
+        if waits {
+            to_work = to_work.saturating_add(robot_steps(&run));
         }
     }
+    let left = to_do.iter().filter(|waits| **waits).count();
+    let shown = SuiteProgress::start(mode, plan, runs.number(), left as u64, to_work);
+    let mut all = || -> anyhow::Result<bool> {
+        let mut waiting = Waiting::new();
+        let mut work = |run: PlannedRun, held: &mut Vec<_>| -> anyhow::Result<bool> {
+            shown.begins(&run);
+            let each_generation = |generation| shown.generation(&run, generation);
+            match work_on(&run, directory, stop, each_generation) {
+                Ok(Worked::Completed) => shown.completed(&run),
+                Ok(Worked::Held(holder)) => held.push((run, holder)),
+                Ok(Worked::Interrupted) => return Ok(false),
+                // A disk that is full is not the fault of one run.
+                Err(error) if error.is_bad_input() => {
+                    damaged.add(&run.directory(directory), error.cause());
+                }
+                Err(error) => return Err(error.into()),
+            }
+            Ok(true)
+        };
+        let mut held = Vec::new();
+        for (run, _) in runs.iter().zip(&to_do).filter(|(_, waits)| **waits) {
+            if !work(run, &mut held)? {
+                return Ok(false);
+            }
+        }
+        while let Some((run, holder)) = held.first() {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+            waiting.wait_for(run, || {
+                shown.waits(run, &run.directory(directory), holder.as_ref());
+            });
+            let number = held.len();
+            for (run, _) in std::mem::take(&mut held) {
+                if !work(run, &mut held)? {
+                    return Ok(false);
+                }
+            }
+            if held.len() < number {
+                waiting.one_ended();
+            }
+        }
+        Ok(true)
+    };
+    let ended = all();
     shown.end();
-    Ok(Some(elsewhere))
+    ended
 }
 
 /// Evolves on until a run has the structure that an experiment is about; false if interrupted.
@@ -742,7 +755,8 @@ fn search(
     damaged: &mut DamagedRuns,
 ) -> anyhow::Result<bool> {
     let shown = SearchProgress::start(mode, &asked.name);
-    let mut after = 0;
+    let (mut after, mut begun) = (0, 0);
+    let mut waiting = Waiting::new();
     let ended = loop {
         let Search::Next(run, number) = look(plan, asked, directory, after, damaged) else {
             break true;
@@ -750,11 +764,17 @@ fn search(
         if damaged.contains(&run.directory(directory)) {
             break true;
         }
-        shown.begins(&run, number, &asked.name);
+        if begun != number {
+            shown.begins(&run, number, &asked.name);
+            begun = number;
+        }
         match work_on(&run, directory, stop, |_| {})? {
             Worked::Completed => after = number - 1,
             // Another process searches, too, and its run decides whether more are needed.
-            Worked::Elsewhere => break true,
+            Worked::Held(_) if stop.load(Ordering::Relaxed) => break false,
+            Worked::Held(holder) => waiting.wait_for(&run, || {
+                shown.waits(&run, &run.directory(directory), holder.as_ref());
+            }),
             Worked::Interrupted => break false,
         }
     };

@@ -1,10 +1,12 @@
 //! Progress of a suite: suite, experiment and run level, with the time left by what was measured.
 
 use super::progress::{ProgressMode, Shown, seconds};
+use crate::lock::{self, Holder};
 use crate::output::for_stderr;
 use crate::suite::plan::{Plan, PlannedRun, label};
 use indicatif::ProgressBar;
 use std::cell::{Cell, RefCell};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Shows the progress of the runs of one process.
@@ -103,6 +105,11 @@ impl<'a> SuiteProgress<'a> {
         }
     }
 
+    /// A run in this directory is waited for, since another process works on it.
+    pub fn waits(&self, run: &PlannedRun, directory: &Path, holder: Option<&Holder>) {
+        waits(&self.shown, run, directory, holder);
+    }
+
     /// Clears the bar.
     pub fn end(&self) {
         if let Shown::Bar(bar) = &self.shown {
@@ -180,11 +187,37 @@ impl SearchProgress {
         }
     }
 
+    /// A run in this directory is waited for, since another process works on it.
+    pub fn waits(&self, run: &PlannedRun, directory: &Path, holder: Option<&Holder>) {
+        waits(&self.shown, run, directory, holder);
+    }
+
     /// Clears the bar.
     pub fn end(&self) {
         if let Shown::Bar(bar) = &self.shown {
             bar.finish_and_clear();
         }
+    }
+}
+
+fn waits(shown: &Shown, run: &PlannedRun, directory: &Path, holder: Option<&Holder>) {
+    let who = lock::named(holder);
+    let say = || tell!("waiting for {}: {who} works on it", directory.display());
+    match shown {
+        Shown::Bar(bar) => bar.suspend(say),
+        Shown::Json => {
+            say();
+            show_event!(
+                "{}",
+                serde_json::json!({
+                    "event": "waiting",
+                    "run": run.id,
+                    "host": holder.map(|holder| &holder.host),
+                    "process": holder.map(|holder| holder.process),
+                })
+            );
+        }
+        Shown::Lines | Shown::Nothing => say(),
     }
 }
 
@@ -203,7 +236,6 @@ fn until(run: &PlannedRun, generation: u32) -> u64 {
 mod tests {
     use super::*;
     use crate::suite::Suite;
-    use std::path::Path;
 
     #[test]
     fn what_is_left_is_counted_by_what_each_run_costs() {

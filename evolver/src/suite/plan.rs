@@ -142,7 +142,7 @@ impl PlannedRun {
     /// Its directory below that of the suite.
     #[must_use]
     pub fn directory(&self, suite: &Path) -> PathBuf {
-        suite.join("runs").join(&self.id)
+        suite.join(RUNS).join(&self.id)
     }
 }
 
@@ -172,6 +172,9 @@ impl<'a> Runs<'a> {
         })
     }
 }
+
+/// The directory of the runs in that of their suite.
+pub const RUNS: &str = "runs";
 
 /// The plan cannot be made.
 #[derive(Debug, thiserror::Error)]

@@ -9,10 +9,13 @@ use crate::evolving::until_finished;
 use crate::experiment::Experiment;
 use crate::files;
 use crate::finished_run::{ReadRunError, complete};
+use crate::lock::Holder;
 use crate::run_dir::{Found, RunDir, RunDirError};
 use minimal_surprise_sim::{Engine, Path as CodePath};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
+use std::thread;
+use std::time::Duration;
 
 /// A share of the runs: every n-th from the i-th on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,14 +87,60 @@ pub fn progress(run: &PlannedRun, suite: &Path) -> Result<Progress, ReadRunError
 }
 
 /// What became of a run that was to be done.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Worked {
     /// It is complete now.
     Completed,
-    /// Another process has it.
-    Elsewhere,
+    /// Another process has it; its lock may say which.
+    Held(Option<Holder>),
     /// It was interrupted, and can be gone on with.
     Interrupted,
+}
+
+/// Waiting for runs that other processes have, or for the end of those processes.
+#[derive(Debug)]
+pub struct Waiting {
+    pause: Duration,
+    said_of: String,
+}
+
+impl Waiting {
+    /// The first pause; each is twice as long as the one before.
+    const PAUSE_MIN: Duration = Duration::from_millis(10);
+    /// The longest pause.
+    const PAUSE_MAX: Duration = Duration::from_secs(1);
+    /// From a pause of this length on, waiting is said.
+    const PAUSE_SAID: Duration = Duration::from_millis(160);
+
+    /// Has not waited yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            pause: Self::PAUSE_MIN,
+            said_of: String::new(),
+        }
+    }
+
+    /// Waits before this run is looked at again. It is said once a run that there is a wait for it.
+    pub fn wait_for(&mut self, run: &PlannedRun, say: impl FnOnce()) {
+        if self.pause >= Self::PAUSE_SAID && self.said_of != run.id {
+            say();
+            self.said_of.clone_from(&run.id);
+        }
+        thread::sleep(self.pause);
+        self.pause = (self.pause * 2).min(Self::PAUSE_MAX);
+    }
+
+    /// A run has come to its end, so others may soon.
+    pub fn one_ended(&mut self) {
+        self.pause = Self::PAUSE_MIN;
+    }
+}
+
+impl Default for Waiting {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 /// Does a run, from where it is. `each_generation` is told the number of generations done.
@@ -121,7 +170,7 @@ fn begin_or_go_on(
     let (mut experiment, held) = match open(run, &directory) {
         Ok(Some(opened)) => opened,
         Ok(None) => return Ok(Worked::Completed),
-        Err(RunDirError::InUse { .. }) => return Ok(Worked::Elsewhere),
+        Err(RunDirError::InUse { holder, .. }) => return Ok(Worked::Held(holder)),
         Err(error) => return Err(error),
     };
     let path = CodePath::from_environment()?;

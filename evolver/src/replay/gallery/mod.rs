@@ -109,7 +109,10 @@ pub fn write(
     remove_abandoned(files::parent(out));
     let write = || {
         let new = NewDir::beside(out)?;
-        let written = found.write(new.path(), out)?;
+        let written = found.write(new.path(), out).map_err(|error| match error {
+            GalleryError::File(error) => new.in_place(error).into(),
+            error => error,
+        })?;
         new.publish()?;
         Ok(written)
     };

@@ -1,0 +1,338 @@
+//! Many processes started at once on one place: none fails, nothing is lost, and what they leave is
+//! what one leaves. With `TEST_ALL=1` thousands of times.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::OnceLock;
+use tempfile::TempDir;
+use tests::full;
+use tests::program::Evolver;
+
+/// Six runs of milliseconds, so that processes meet often.
+const SUITE: &str = "
+name = \"own\"
+
+[[experiment]]
+name = \"one\"
+runs = 6
+grids = [\"8x8\"]
+robots = [20]
+population = 4
+generations = 2
+repetitions = 1
+steps = 20
+";
+
+const RUN: &str = "suite own.toml run --out suite --threads 1 --progress none";
+
+/// The locks of a file system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Locks {
+    /// Every process sees those of all others.
+    Working,
+    /// It has none.
+    Missing,
+    /// A host does not see those of other hosts, and each process is on another host.
+    OfOneHost,
+}
+
+const ALL_LOCKS: [Locks; 3] = [Locks::Working, Locks::Missing, Locks::OfOneHost];
+
+/// Stands before the C library, where there are no working locks.
+const OTHER_LOCKS: &str = "
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+int flock(int file, int operation) {
+    (void)file, (void)operation;
+    if (getenv(\"NO_LOCKS\")) { errno = ENOLCK; return -1; }
+    return 0;
+}
+
+int gethostname(char *name, size_t size) {
+    snprintf(name, size, \"host-%d\", (int)getpid());
+    return 0;
+}
+";
+
+/// The library made of it, built once.
+fn other_locks() -> PathBuf {
+    static FOLDER: OnceLock<TempDir> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let folder = TempDir::new().expect("a temporary folder");
+        let source = folder.path().join("locks.c");
+        fs::write(&source, OTHER_LOCKS).unwrap();
+        let built = Command::new("cc")
+            .args(["-shared", "-fPIC", "-o"])
+            .arg(folder.path().join("locks.so"))
+            .arg(source)
+            .status();
+        assert!(built.is_ok_and(|status| status.success()), "cc");
+        folder
+    });
+    folder.path().join("locks.so")
+}
+
+/// How often something is done: less unless all cases are asked for.
+fn times(reduced: usize, all: usize) -> usize {
+    if full::all_cases() { all } else { reduced }
+}
+
+fn command(evolver: &Evolver, locks: Locks, line: &str) -> Command {
+    let mut command = Command::new(evolver.program());
+    command
+        .args(line.split(' '))
+        .current_dir(evolver.folder())
+        .env_remove("CARGO")
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    if locks != Locks::Working {
+        command.env("LD_PRELOAD", other_locks());
+    }
+    if locks == Locks::Missing {
+        command.env("NO_LOCKS", "1");
+    }
+    command
+}
+
+/// Starts all these, and waits for all.
+fn at_once(evolver: &Evolver, locks: Locks, lines: &[&str]) -> Vec<Output> {
+    let start = |line: &&str| command(evolver, locks, line).spawn().expect("it starts");
+    let started: Vec<Child> = lines.iter().map(start).collect();
+    let ended = started.into_iter().map(Child::wait_with_output);
+    ended
+        .map(|output| output.expect("it is our child"))
+        .collect()
+}
+
+fn assert_success(outputs: &[Output], what: &str) {
+    for output in outputs {
+        assert!(output.status.success(), "{what}: {output:?}");
+    }
+}
+
+/// Every file below a folder, hidden ones too, but for those that say by which command a run was
+/// made and how long it took.
+fn contents(evolver: &Evolver, folder: &str) -> BTreeMap<String, Vec<u8>> {
+    let files = evolver.files().into_iter();
+    files
+        .filter(|file| file.starts_with(folder))
+        .filter(|file| !file.ends_with("/meta.json") && !file.ends_with("/time.json"))
+        .map(|file| (file.clone(), evolver.read(&file)))
+        .collect()
+}
+
+fn assert_equal(
+    found: &BTreeMap<String, Vec<u8>>,
+    expected: &BTreeMap<String, Vec<u8>>,
+    what: &str,
+) {
+    let names: Vec<&String> = found.keys().collect();
+    let expected_names: Vec<&String> = expected.keys().collect();
+    assert_eq!(names, expected_names, "{what}");
+    for (name, contents) in found {
+        assert!(contents == &expected[name], "{what}: {name} differs");
+    }
+}
+
+fn with_the_suite() -> Evolver {
+    let evolver = Evolver::in_empty_folder();
+    evolver.write("own.toml", SUITE.as_bytes());
+    evolver
+}
+
+#[test]
+fn six_processes_on_one_suite_all_succeed_and_leave_what_one_leaves() {
+    let task = RUN.replace("suite own.toml run", "run-task --suite own.toml --shard");
+    let task = |shard: &str| task.replace("--shard", &format!("--shard {shard}"));
+    let tasks = ["0/2", "1/2", "0/1"].map(task);
+    let lines = [RUN, &tasks[0], RUN, &tasks[1], RUN, &tasks[2]];
+    let alone = with_the_suite();
+    for line in lines {
+        assert_success(&at_once(&alone, Locks::Working, &[line]), line);
+    }
+    let expected = contents(&alone, "suite");
+    for locks in ALL_LOCKS {
+        let starts = times(8, if locks == Locks::Working { 2000 } else { 500 });
+        for start in 0..starts {
+            let what = format!("start {start} with {locks:?} locks");
+            let evolver = with_the_suite();
+            let outputs = at_once(&evolver, locks, &lines);
+            assert_success(&outputs, &what);
+            for (output, line) in outputs.iter().zip(lines) {
+                let stdout = String::from_utf8_lossy(&output.stdout);
+                let runs = if line.contains("/2") { 3 } else { 6 };
+                let done = format!("{runs} of {runs} runs done");
+                assert!(stdout.contains(&done), "{what}: {output:?}");
+            }
+            assert_equal(&contents(&evolver, "suite"), &expected, &what);
+        }
+    }
+}
+
+#[test]
+fn six_evolutions_of_one_name_each_get_a_directory_of_their_own() {
+    let evolve = "evolve --grid 8x8 --robots 20 --population 4 --generations 2 --repetitions 1 \
+                  --steps 20 --seed 3 --threads 1 --progress none";
+    for locks in ALL_LOCKS {
+        for start in 0..times(4, if locks == Locks::Working { 500 } else { 100 }) {
+            let what = format!("start {start} with {locks:?} locks");
+            let evolver = Evolver::in_empty_folder();
+            assert_success(&at_once(&evolver, locks, &[evolve; 6]), &what);
+            let runs = fs::read_dir(evolver.folder().join("runs")).unwrap();
+            let mut runs: Vec<String> = runs
+                .map(|run| run.unwrap().file_name().to_string_lossy().into_owned())
+                .collect();
+            runs.sort_by_key(String::len);
+            let name = runs[0].clone();
+            let numbered = (2..=6).map(|number| format!("{name}-{number}"));
+            let mut expected: Vec<String> = [name.clone()].into_iter().chain(numbered).collect();
+            runs.sort();
+            expected.sort();
+            assert_eq!(runs, expected, "{what}");
+            let of = |run: &str| {
+                let files = contents(&evolver, &format!("runs/{run}/")).into_iter();
+                let relative = |name: String| name.rsplit('/').next().map(str::to_owned);
+                files
+                    .map(|(name, text)| (relative(name).unwrap_or_default(), text))
+                    .collect()
+            };
+            let first = of(&name);
+            for run in &runs {
+                assert_equal(&of(run), &first, &what);
+            }
+        }
+    }
+}
+
+#[test]
+fn of_two_galleries_at_once_one_is_there_as_a_whole_and_a_folder_of_the_users_stays() {
+    let evolver = with_the_suite();
+    assert_success(&at_once(&evolver, Locks::Working, &[RUN]), RUN);
+    evolver.write("suite/.g.part", b"a letter");
+    let gallery = "gallery . --out g --threads 1";
+    assert_success(&at_once(&evolver, Locks::Working, &[gallery]), gallery);
+    let (expected, runs) = (contents(&evolver, "g/"), contents(&evolver, "suite/"));
+    for start in 0..times(6, 500) {
+        for (locks, overwrite) in ALL_LOCKS.into_iter().flat_map(|l| [(l, false), (l, true)]) {
+            let what = format!("start {start} with {locks:?} locks, overwriting: {overwrite}");
+            fs::remove_dir_all(evolver.folder().join("g")).unwrap();
+            fs::create_dir_all(evolver.folder().join(".g.part")).unwrap();
+            evolver.write(".g.part/mother.txt", b"dear");
+            let line = if overwrite {
+                format!("{gallery} --overwrite")
+            } else {
+                gallery.to_owned()
+            };
+            let outputs = at_once(&evolver, locks, &[&line, &line]);
+            let mut codes = [0, 1].map(|one: usize| outputs[one].status.code());
+            codes.sort_unstable();
+            assert_eq!(codes[0], Some(0), "{what}: {outputs:?}");
+            if overwrite {
+                assert_eq!(codes[1], Some(0), "{what}: {outputs:?}");
+            } else {
+                assert_eq!(codes[1], Some(2), "{what}: {outputs:?}");
+                let exists =
+                    |output: &Output| String::from_utf8_lossy(&output.stderr).contains("g exists");
+                assert!(outputs.iter().any(exists), "{what}: {outputs:?}");
+            }
+            assert_equal(&contents(&evolver, "g/"), &expected, &what);
+            assert_equal(&contents(&evolver, "suite/"), &runs, &what);
+            assert_eq!(evolver.read(".g.part/mother.txt"), b"dear", "{what}");
+            let parts = fs::read_dir(evolver.folder()).unwrap().flatten();
+            let parts =
+                parts.filter(|entry| entry.file_name().to_string_lossy().ends_with(".part"));
+            assert_eq!(parts.count(), 1, "{what}: only that of the user");
+        }
+    }
+}
+
+/// Sends a signal to a process of ours.
+fn signal(name: &str, child: &Child) {
+    let kill = format!("kill -{name} {}", child.id());
+    let sent = Command::new("sh").args(["-c", &kill]).status();
+    assert!(sent.is_ok_and(|status| status.success()), "{kill}");
+}
+
+#[test]
+fn a_run_that_a_stopped_process_holds_is_waited_for_and_it_is_said_who_holds_it() {
+    for (way, ends) in [
+        (
+            "run-task --suite own.toml --shard 0/1 --progress lines",
+            "CONT",
+        ),
+        ("suite own.toml run --progress json", "KILL"),
+    ] {
+        let evolver = Evolver::in_empty_folder();
+        // One run of a moment, long enough to be stopped in.
+        let long = SUITE
+            .replace("runs = 6", "runs = 1")
+            .replace("generations = 2", "generations = 100")
+            .replace("steps = 20", "steps = 5000");
+        evolver.write("own.toml", long.as_bytes());
+        let mut holder = command(&evolver, Locks::Working, RUN).spawn().unwrap();
+        let begun = || {
+            evolver
+                .files()
+                .iter()
+                .any(|file| file.ends_with("/config.toml"))
+        };
+        while !begun() {
+            std::thread::yield_now();
+        }
+        signal("STOP", &holder);
+        let line = format!("{way} --out suite --threads 1");
+        let mut waiter = command(&evolver, Locks::Working, &line).spawn().unwrap();
+        let mut stderr = BufReader::new(waiter.stderr.take().unwrap()).lines();
+        let said = stderr
+            .by_ref()
+            .map(Result::unwrap)
+            .find(|line| line.contains("waiting"))
+            .expect("waiting is said before the end");
+        let who = format!("process {} on ", holder.id());
+        assert!(
+            said.contains(&who) && said.contains("suite/runs/"),
+            "{said}"
+        );
+        signal(ends, &holder);
+        let output = waiter.wait_with_output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        let stdout = String::from_utf8_lossy(&output.stdout);
+        let again = stderr
+            .map(Result::unwrap)
+            .filter(|line| line.contains("waiting"));
+        assert_eq!(again.count(), 0, "it is said once");
+        if way.contains("json") {
+            let event = format!("\"process\":{},", holder.id());
+            let waiting = stdout
+                .lines()
+                .filter(|line| line.contains("\"event\":\"waiting\""));
+            assert_eq!(
+                waiting.filter(|line| line.contains(&event)).count(),
+                1,
+                "{stdout}"
+            );
+            assert!(stdout.contains("\"runs_done\":1"), "{stdout}");
+        } else {
+            assert!(stdout.contains("1 of 1 runs done"), "{stdout}");
+        }
+        assert_eq!(holder.wait().unwrap().success(), ends == "CONT");
+    }
+}
+
+#[test]
+fn a_share_without_runs_is_done_at_once_also_where_there_is_no_suite_yet() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.write("own.toml", SUITE.replace("runs = 6", "runs = 1").as_bytes());
+    let task = "run-task --suite own.toml --shard 1/2 --out new";
+    let outputs = at_once(&evolver, Locks::Working, &[task; 2]);
+    assert_success(&outputs, task);
+    let stdout = String::from_utf8_lossy(&outputs[0].stdout);
+    assert!(stdout.contains("0 of 0 runs done"), "{stdout}");
+}

@@ -1,0 +1,168 @@
+//! Files that commands write: on a full disk, under long names, and where there is no plain file.
+
+use std::fs;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::{FileTypeExt, symlink};
+use std::path::Path;
+use std::process::Command;
+use std::thread;
+use tests::disk::Disk;
+use tests::program::Evolver;
+
+const EVOLVE: [&str; 11] = [
+    "evolve",
+    "--grid",
+    "8x8",
+    "--robots",
+    "20",
+    "--population",
+    "4",
+    "--generations",
+    "2",
+    "--seed",
+    "7",
+];
+
+/// With a run in `r`.
+fn with_a_run() -> Evolver {
+    let evolver = Evolver::in_empty_folder();
+    evolve(&evolver, "r");
+    evolver
+}
+
+fn evolve(evolver: &Evolver, out: &str) {
+    let evolved = evolver.run(&[&EVOLVE[..], &["--repetitions", "1", "--out", out]].concat());
+    assert_eq!(evolved.code, Some(0), "{evolved:?}");
+}
+
+#[test]
+fn on_a_full_disk_nothing_is_left_and_the_second_try_succeeds() {
+    let evolver = with_a_run();
+    let Some(disk) = Disk::mounted_at(evolver.folder().join("disk"), "8k") else {
+        println!("skipped: no file system can be mounted here");
+        return;
+    };
+    let writers: [&[&str]; 4] = [
+        &[
+            "export",
+            "r",
+            "--format",
+            "trajectory",
+            "--out",
+            "disk/file",
+        ],
+        &["gallery", "r", "--threads", "1", "--out", "disk/gallery"],
+        &["replay", "r", "--html", "disk/page.html"],
+        &[
+            "evolve",
+            "r/config.toml",
+            "--seed",
+            "8",
+            "--out",
+            "disk/run",
+        ],
+    ];
+    for writer in writers {
+        let full = evolver.run(writer);
+        assert_eq!(full.code, Some(1), "{writer:?}: {full:?}");
+        assert!(
+            full.stderr.contains("No space left"),
+            "{writer:?}: {full:?}"
+        );
+        let left = fs::read_dir(evolver.folder().join("disk")).unwrap().count();
+        assert_eq!(left, 0, "{writer:?}");
+    }
+    disk.remount("size=64m");
+    for writer in writers {
+        let again = evolver.run(writer);
+        assert_eq!(again.code, Some(0), "{writer:?}: {again:?}");
+    }
+}
+
+#[test]
+fn names_as_long_as_file_systems_take_are_written() {
+    let evolver = with_a_run();
+    for length in [236, 255] {
+        let run = "r".repeat(length);
+        evolve(&evolver, &run);
+        assert_eq!(evolver.text(&format!("{run}/DONE")), evolver.text("r/DONE"));
+        let file = "f".repeat(length);
+        let exported = evolver.run(&["export", "r", "--format", "c", "--out", &file]);
+        assert_eq!(exported.code, Some(0), "{exported:?}");
+        let gallery = "g".repeat(length);
+        let written = evolver.run(&["gallery", "r", "--out", &gallery]);
+        assert_eq!(written.code, Some(0), "{written:?}");
+    }
+    let too_long = evolver.run(&["export", "r", "--format", "c", "--out", &"f".repeat(256)]);
+    assert_eq!(too_long.code, Some(2), "{too_long:?}");
+    assert!(
+        too_long.stderr.contains("File name too long"),
+        "{too_long:?}"
+    );
+}
+
+fn svg(evolver: &Evolver, file: &str) -> tests::program::Finished {
+    evolver.run(&["replay", "r", "--svg", file, "--overwrite"])
+}
+
+#[test]
+fn overwriting_keeps_a_link_a_pipe_and_a_device_what_they_are() {
+    let evolver = with_a_run();
+    assert_eq!(svg(&evolver, "expected.svg").code, Some(0));
+    let expected = evolver.read("expected.svg");
+    let at = |name: &str| evolver.folder().join(name);
+
+    evolver.write("target.svg", b"old");
+    symlink("target.svg", at("link.svg")).unwrap();
+    assert_eq!(svg(&evolver, "link.svg").code, Some(0));
+    assert!(at("link.svg").is_symlink());
+    assert_eq!(evolver.read("target.svg"), expected);
+
+    let made = Command::new("mkfifo").arg(at("pipe")).status();
+    assert!(made.is_ok_and(|status| status.success()), "mkfifo");
+    let (written, read) = thread::scope(|scope| {
+        let reader = scope.spawn(|| fs::read(at("pipe")));
+        (
+            svg(&evolver, "pipe"),
+            reader.join().expect("it does not panic"),
+        )
+    });
+    assert_eq!(written.code, Some(0), "{written:?}");
+    assert_eq!(read.unwrap(), expected);
+    let kind = at("pipe").metadata().unwrap().file_type();
+    assert!(kind.is_fifo());
+
+    if Path::new("/dev/full").exists() {
+        symlink("/dev/full", at("full")).unwrap();
+        let full = svg(&evolver, "full");
+        assert_eq!(full.code, Some(1), "{full:?}");
+        assert!(full.stderr.contains("No space left"), "{full:?}");
+    }
+}
+
+#[test]
+fn overwriting_a_mounted_file_writes_to_it() {
+    let evolver = with_a_run();
+    assert_eq!(svg(&evolver, "expected.svg").code, Some(0));
+    for name in ["outside.svg", "mounted.svg"] {
+        evolver.write(name, b"old");
+    }
+    let at = |name: &str| evolver.folder().join(name);
+    let Some(_mounted) = Disk::bound(&at("outside.svg"), at("mounted.svg")) else {
+        println!("skipped: no file can be mounted here");
+        return;
+    };
+    let written = svg(&evolver, "mounted.svg");
+    assert_eq!(written.code, Some(0), "{written:?}");
+    assert_eq!(evolver.read("outside.svg"), evolver.read("expected.svg"));
+}
+
+#[test]
+fn a_name_that_is_not_utf_8_is_written() {
+    let evolver = with_a_run();
+    let name = std::ffi::OsStr::from_bytes(b"caf\xe9.h");
+    let words = ["export", "r", "--format", "c", "--out"].map(std::ffi::OsStr::new);
+    let exported = evolver.run(&[&words[..], &[name]].concat());
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+    assert!(evolver.folder().join(name).is_file());
+}
