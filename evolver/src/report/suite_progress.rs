@@ -3,6 +3,7 @@
 use super::progress::{ProgressMode, Shown, seconds};
 use crate::lock::{self, Holder};
 use crate::output::for_stderr;
+use crate::settings::add_seed;
 use crate::suite::plan::{Plan, PlannedRun, label};
 use indicatif::ProgressBar;
 use std::cell::{Cell, RefCell};
@@ -172,17 +173,17 @@ impl SearchProgress {
                 "{experiment}: run {number} beyond the plan, {label}, seed {}",
                 run.seed
             ),
-            Shown::Json => show_event!(
-                "{}",
-                serde_json::json!({
+            Shown::Json => {
+                let mut event = serde_json::json!({
                     "event": "further-run",
                     "experiment": experiment,
                     "number": number,
                     "run": run.id,
                     "label": label,
-                    "seed": run.seed,
-                })
-            ),
+                });
+                add_seed(&mut event, run.seed);
+                show_event!("{event}");
+            }
             Shown::Nothing => {}
         }
     }
