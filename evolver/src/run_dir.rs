@@ -95,14 +95,6 @@ pub enum RunDirError {
     },
 }
 
-impl RunDirError {
-    /// Whether the user gave something that cannot be used, as opposed to something that broke.
-    #[must_use]
-    pub fn is_bad_input(&self) -> bool {
-        !matches!(self, Self::File(_))
-    }
-}
-
 const CHECKPOINT: &str = "checkpoint";
 const CONFIG: &str = "config.toml";
 const META: &str = "meta.json";

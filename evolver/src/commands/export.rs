@@ -1,5 +1,6 @@
 //! `evolver export`: runs and genomes in the formats of other programs.
 
+use super::errors::unusable;
 use super::evaluate::flag;
 use super::replay::write_file;
 use super::{BadInput, genome_file, read_genome};
@@ -117,7 +118,7 @@ fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
         ))
         .into());
     }
-    let finished = FinishedRun::read_and_check(&arguments.from).map_err(BadInput::new)?;
+    let finished = FinishedRun::read_and_check(&arguments.from).map_err(unusable)?;
     let trace = finished.trace()?;
     let grid = finished.settings.scenario.grid();
     let mut text = Vec::new();

@@ -1,7 +1,8 @@
 //! `evolver gallery`: all runs at a glance, each a step from its replay.
 
+use super::errors::{name_damaged, unusable};
 use super::evaluate::flag;
-use super::{BadInput, name_damaged, thread_pool};
+use super::thread_pool;
 use crate::exit::Exit;
 use crate::files::Existing;
 use crate::replay::gallery::write;
@@ -38,7 +39,7 @@ pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
     let existing = Existing::with_overwrite(arguments.overwrite);
     let written = thread_pool(threads)?
         .install(|| write(&arguments.directories, &arguments.out, existing))
-        .map_err(BadInput::new)?;
+        .map_err(unusable)?;
     let left_out = match written.unfinished {
         0 => String::new(),
         n => format!("; {n} that have not ended left out"),

@@ -1,7 +1,8 @@
 //! `evolver paper` and `evolver suite FILE`: many evolutions, on one machine or many.
 
+use super::errors::{name_damaged, stopped};
 use super::evaluate::flag;
-use super::{BadInput, name_damaged, stopped, thread_pool};
+use super::{BadInput, thread_pool};
 use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
 use crate::files::{self, Existing};
@@ -592,7 +593,10 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     }
     let worked = worked.filter(|_| searched);
     let Some(elsewhere) = worked else {
-        return stopped("the same command");
+        return match work.share {
+            Share::Whole => stopped(&command(work.read, work.choice, directory)),
+            Share::One(_) => stopped("the same command"),
+        };
     };
     let mut hash = Sha256::new();
     let mut hashes = Vec::new();
@@ -705,7 +709,9 @@ fn do_all(
                 return Ok(None);
             }
             // A disk that is full is not the fault of one run.
-            Err(error) if error.is_bad_input() => damaged.add(&run.directory(directory), error),
+            Err(error) if !matches!(error, RunDirError::File(_)) => {
+                damaged.add(&run.directory(directory), error)
+            }
             Err(error) => {
                 shown.end();
                 return Err(error.into());
