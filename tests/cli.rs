@@ -5,7 +5,7 @@ use minimal_surprise_controller::{
     EncodedGenome, Genome, KERNEL_ID, Prediction, Provenance, SensorModel, Topology,
 };
 use std::fs;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tests::program::{Evolver, Finished};
 
 /// Flags of an evolution that takes a moment.
@@ -17,6 +17,26 @@ const SHORT: [(&str, &str); 6] = [
     ("--repetitions", "2"),
     ("--generations", "3"),
 ];
+
+/// Longest wait for a process.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Waits for something that another process does.
+fn wait_until(what: &str, holds: impl Fn() -> bool) {
+    let started = Instant::now();
+    while !holds() {
+        assert!(started.elapsed() < PATIENCE, "no {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Progress in JSON.
+fn events(run: &Finished) -> Vec<serde_json::Value> {
+    let lines = run.stdout.lines();
+    lines
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
 
 /// A short evolution with more flags, which go before those of the same name.
 fn short(flags: &[&str]) -> Vec<String> {
@@ -385,9 +405,8 @@ fn only_an_unchanged_run_is_resumed() {
     let long = short(&["--seed", "1", "--generations", "100000", "--out", "cut"]);
     let running = evolver.start(&long);
     running.wait_for_lines(3);
-    let refused = evolver.run(&resume("cut"));
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(refused.stderr.contains("another process"), "{refused:?}");
+    let held = evolver.run(&resume("cut"));
+    held.assert_failed(&["cut is in use by"]);
     running.kill();
 
     let config = evolver.text("cut/config.toml");
@@ -395,16 +414,14 @@ fn only_an_unchanged_run_is_resumed() {
         "cut/config.toml",
         config.replace("steps = 20", "steps = 21").as_bytes(),
     );
-    assert_refused(
-        &evolver,
-        &resume("cut"),
-        &["config.toml is not what the run was started with"],
-    );
+    let cut = evolver.run(&resume("cut"));
+    cut.assert_failed(&["config.toml is not what the run was started with"]);
     evolver.write("cut/config.toml", config.as_bytes());
     let mut checkpoint = evolver.read("cut/checkpoint");
     checkpoint[100] ^= 4;
     evolver.write("cut/checkpoint", &checkpoint);
-    assert_refused(&evolver, &resume("cut"), &["cut/checkpoint", "damaged"]);
+    let cut = evolver.run(&resume("cut"));
+    cut.assert_failed(&["cut/checkpoint", "damaged"]);
     fs::remove_file(evolver.folder().join("cut/checkpoint")).unwrap();
     assert_refused(&evolver, &resume("cut"), &["cut", "no checkpoint"]);
     let flags = [&resume("cut")[..], &["--seed".to_owned(), "2".to_owned()]].concat();
@@ -416,20 +433,235 @@ fn only_an_unchanged_run_is_resumed() {
 }
 
 #[test]
-fn ctrl_c_ends_cleanly_and_says_how_to_go_on() {
+fn the_first_signal_ends_cleanly_and_says_how_to_go_on() {
     let evolver = Evolver::in_empty_folder();
-    let arguments = |out| short(&["--seed", "9", "--generations", "400", "--out", out]);
+    let arguments = |out| short(&["--seed", "9", "--generations", "150", "--out", out]);
     let whole = evolver.run(&arguments("whole"));
-    let running = evolver.start(&arguments("cut"));
-    running.wait_for_lines(1);
-    let stopped = running.interrupt(Duration::from_secs(60));
-    assert_eq!(stopped.code, Some(130), "{stopped:?}");
-    assert!(
-        stopped.stderr.contains("evolve --resume cut"),
-        "{stopped:?}"
-    );
+    for signal in ["INT", "TERM", "HUP"] {
+        let running = evolver.start(&arguments(signal));
+        running.wait_for_lines(1);
+        running.signal(signal);
+        let stopped = running.ended(PATIENCE);
+        assert_eq!(stopped.code, Some(130), "{signal}: {stopped:?}");
+        let resume = format!("evolve --resume {signal}");
+        assert!(stopped.stderr.contains(&resume), "{stopped:?}");
+
+        let resumed = evolver.run(&["evolve", "--resume", signal, "--progress", "json"]);
+        let events = events(&resumed);
+        let (done, generations) = events.split_last().unwrap();
+        assert_eq!(done["hash"], hash_of(&whole));
+        for (later, event) in generations.iter().enumerate() {
+            assert_eq!(event["generation"], 150 - generations.len() + later);
+            let left = event["seconds_left"].as_f64().unwrap();
+            assert!((0.0..1e6).contains(&left), "{event}");
+            assert!(event["robot_steps_per_second"].as_f64().unwrap() > 0.0);
+        }
+        assert_eq!(generations.last().unwrap()["seconds_left"], 0.0);
+    }
+}
+
+/// A generation that takes longer than any test waits.
+const ENDLESS: &str = "--grid 20x20 --robots 100 --population 50 --repetitions 10 \
+                       --steps 3000000 --threads 1 --seed 1 --out endless";
+
+#[cfg(unix)]
+#[test]
+fn the_second_signal_ends_at_once() {
+    let evolver = Evolver::in_empty_folder();
+    let arguments: Vec<&str> = ["evolve"]
+        .into_iter()
+        .chain(ENDLESS.split_whitespace())
+        .collect();
+    let running = evolver.start(&arguments);
+    let checkpoint = evolver.folder().join("endless/checkpoint");
+    wait_until("a checkpoint", || checkpoint.exists());
+    running.signal("INT");
+    running.wait_for_lines(2);
+    running.signal("INT");
+    let ended = running.ended(PATIENCE);
+    assert_eq!(ended.code, Some(130), "{ended:?}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_signal_that_the_caller_ignores_stays_ignored() {
+    let evolver = Evolver::in_empty_folder();
+    let work = short(&["--seed", "9", "--generations", "100", "--out"]).join(" ");
+    let program = evolver.program().display();
+    let done = |out: &str, starts: String, signal: &str| {
+        let mut shell = evolver.shell(&starts);
+        wait_until("a generation", || {
+            let table = evolver.folder().join(out).join("generations.csv");
+            fs::read_to_string(table).is_ok_and(|table| table.lines().count() > 1)
+        });
+        let line = format!("kill -{signal} $(cat pid)");
+        let sent = evolver.shell(&line).wait().unwrap();
+        assert!(sent.success(), "{out} had ended");
+        assert!(shell.wait().unwrap().success(), "{out}");
+        assert!(evolver.folder().join(out).join("DONE").exists(), "{out}");
+    };
+    for signal in ["INT", "TERM", "HUP"] {
+        let line = format!("trap '' {signal}; {program} {work} {signal} & echo $! > pid; wait $!");
+        done(signal, line, signal);
+    }
+    // Shells ignore SIGINT for their jobs in the background.
+    let job = format!("{program} {work} job & echo $! > pid; wait $!");
+    done("job", job, "INT");
+    let nohup = format!("nohup {program} {work} nohup > out 2>&1 & echo $! > pid; wait $!");
+    done("nohup", nohup, "HUP");
+}
+
+#[cfg(unix)]
+#[test]
+fn work_whose_reader_goes_stops_unfinished_and_says_how_to_go_on() {
+    let evolver = Evolver::in_empty_folder();
+    let program = evolver.program().display();
+    let work = short(&["--generations", "150"]).join(" ");
+    let unfinished = |line: &str, reader: &str, words: &str| {
+        let line = format!("{{ {program} {line}; echo code $? >&2; }} | {reader}");
+        let piped = evolver.shell(&line).wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&piped.stderr);
+        assert!(said.ends_with("code 3\n"), "{line}: {said}");
+        assert!(said.contains("nobody reads standard output"), "{said}");
+        assert!(said.contains(words), "{line}: {said}");
+    };
+    let whole = evolver.run(&short(&[
+        "--generations",
+        "150",
+        "--seed",
+        "9",
+        "--out",
+        "whole",
+    ]));
+    let line = format!("{work} --seed 9 --out cut --progress json");
+    unfinished(&line, "head -1", "evolve --resume cut");
     let resumed = evolver.run(&["evolve", "--resume", "cut"]);
     assert_eq!(hash_of(&resumed), hash_of(&whole));
+    // What is drawn is shown before the work begins.
+    unfinished(
+        &format!("{work} --out drawn"),
+        "sleep 0",
+        "evolve --resume drawn",
+    );
+
+    let suite = "name = \"own\"\n[[experiment]]\nname = \"one\"\nruns = 6\ngrids = [\"8x8\"]\n\
+                 robots = [20]\npopulation = 4\ngenerations = 40\nrepetitions = 1\nsteps = 20\n";
+    evolver.write("own.toml", suite.as_bytes());
+    let run = "suite own.toml run --out suite --progress json";
+    unfinished(run, "head -1", "go on with: ");
+    let finished = evolver.run(&["suite", "own.toml", "run", "--out", "suite"]);
+    assert_eq!(finished.code, Some(0), "{finished:?}");
+    assert!(finished.stdout.contains("6 of 6 runs done"), "{finished:?}");
+}
+
+/// Commands that print, in a folder with a run.
+const PRINTING: [&str; 15] = [
+    "--help",
+    "--version",
+    "help evolve",
+    "suite --help",
+    "completions bash",
+    "completions fish",
+    "classify run",
+    "classify run --json",
+    "inspect run",
+    "evaluate run --starts 2",
+    "damage run --area 0,0,3,3 --remove --repeat 2 --structure line",
+    "export run --format c",
+    "hil run --simulate",
+    "paper plan",
+    "paper status",
+];
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_behind_standard_output_is_a_failure_and_no_panic() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.run(&short(&["--seed", "1", "--out", "run"]));
+    let program = evolver.program().display();
+    let evolve = format!("{} --seed 1 --out other", short(&[]).join(" "));
+    for command in PRINTING
+        .into_iter()
+        .chain([evolve.as_str(), "evolve --resume run"])
+    {
+        let piped = evolver.shell(&format!("{program} {command} > /dev/full"));
+        let piped = piped.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&piped.stderr);
+        assert_eq!(piped.status.code(), Some(1), "{command}: {said}");
+        assert!(
+            said.contains("standard output: No space left"),
+            "{command}: {said}"
+        );
+    }
+    let line = format!("{program} {evolve}-2 --progress json > /dev/full");
+    let piped = evolver.shell(&line).wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&piped.stderr);
+    assert_eq!(piped.status.code(), Some(1), "{said}");
+    assert!(said.contains("evolve --resume other-2"), "{said}");
+    // Nor is standard error anything to panic about.
+    let lines = short(&["--seed", "1", "--progress", "lines", "--out"]).join(" ");
+    for (index, place) in ["/dev/full", "&-"].into_iter().enumerate() {
+        for (command, code) in [
+            (format!("{lines} quiet-{index}"), 0),
+            ("classify nothing".to_owned(), 2),
+            ("classify --nosuch".to_owned(), 2),
+            ("classify run > /dev/full".to_owned(), 1),
+        ] {
+            let shell = evolver.shell(&format!("{program} {command} 2>{place}"));
+            let piped = shell.wait_with_output().unwrap();
+            assert_eq!(piped.status.code(), Some(code), "{command} 2>{place}");
+        }
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn exit_codes_tell_bad_input_failures_and_interruptions_apart() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.run(&short(&["--seed", "1", "--out", "run"]));
+    evolver.run(&short(&["--seed", "1", "--out", "cut"]));
+    let state = evolver.read("cut/final.json");
+    evolver.write("cut/final.json", &state[..state.len() / 2]);
+    evolver.write("cut/best.genome", &evolver.read("run/best.genome")[..100]);
+    evolver.write("cut.genome", &evolver.read("cut/best.genome"));
+    let cases = [
+        ("--version", 0),
+        ("classify run", 0),
+        // Something broke: a run, the disk.
+        ("classify cut", 1),
+        ("inspect cut", 1),
+        ("replay cut --svg a.svg", 1),
+        ("damage cut --area 0,0,1,1 --remove", 1),
+        ("export cut --format trajectory", 1),
+        ("hil cut --simulate", 1),
+        ("evolve --resume cut", 1),
+        ("inspect /proc/self/mem", 1),
+        ("replay run --svg /dev/full --overwrite", 1),
+        // What was given cannot be used.
+        ("nosuch", 2),
+        ("classify --nosuch", 2),
+        ("classify nothing", 2),
+        ("inspect cut.genome", 2),
+        ("inspect .", 2),
+        ("evaluate nothing", 2),
+        ("suite nothing.toml run", 2),
+        ("suite . plan", 2),
+        ("evolve nothing.toml", 2),
+        ("evolve --robots 0", 2),
+        ("evolve --resume nothing", 2),
+        ("replay run", 2),
+        ("replay run --svg no/folder.svg", 2),
+        ("gallery .git", 2),
+    ];
+    for (command, code) in cases {
+        let arguments: Vec<&str> = command.split(' ').collect();
+        let run = evolver.run(&arguments);
+        assert_eq!(run.code, Some(code), "{command}: {run:?}");
+    }
+    let table = include_str!("../docs/exit-codes.md");
+    for code in [0, 1, 2, 3, 130] {
+        assert!(table.contains(&format!("\n| {code} | ")), "no {code}");
+    }
 }
 
 #[test]
@@ -443,11 +675,7 @@ fn progress_can_be_lines_json_or_nothing() {
     let nothing = evolver.run(&short(&["--seed", "1", "--progress", "none"]));
     assert_eq!(nothing.stderr, "");
     let json = evolver.run(&short(&["--seed", "1", "--progress", "json"]));
-    let events: Vec<serde_json::Value> = json
-        .stdout
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+    let events = events(&json);
     assert_eq!(events.len(), 4);
     assert_eq!(events[2]["generation"], 2);
     assert_eq!(events[3]["event"], "done");
@@ -542,23 +770,18 @@ fn a_directory_is_a_run_as_soon_as_it_has_its_name() {
     assert!(resumed > 0);
 }
 
+#[cfg(unix)]
 #[test]
-fn a_reader_that_goes_is_no_error() {
+fn a_report_whose_reader_goes_ends_quietly() {
     let evolver = Evolver::in_empty_folder();
     evolver.run(&short(&["--seed", "1", "--out", "run"]));
-    for command in [
-        "classify run --json",
-        "inspect run/best.genome",
-        "paper plan",
-    ] {
-        let line = format!("{} {command} | head -c 5", evolver.program().display());
-        let piped = std::process::Command::new("sh")
-            .args(["-c", &line])
-            .current_dir(evolver.folder())
-            .output()
-            .unwrap();
-        assert_eq!(piped.stdout.len(), 5);
-        assert_eq!(String::from_utf8_lossy(&piped.stderr), "", "{command}");
+    let program = evolver.program().display();
+    for command in PRINTING {
+        let line = format!("{{ {program} {command}; echo code $? >&2; }} | head -c 5");
+        let piped = evolver.shell(&line).wait_with_output().unwrap();
+        assert_eq!(piped.stdout.len(), 5, "{command}");
+        let said = String::from_utf8_lossy(&piped.stderr);
+        assert_eq!(said, "code 0\n", "{command}");
     }
 }
 

@@ -730,7 +730,7 @@ fn a_run_with_the_genome_or_the_state_of_another_is_refused_by_all_who_replay_it
         evolver.write(&file, &bytes);
         for line in lines {
             let run = evolver.run(&words(line));
-            assert_refused(&run, &["error: run: ", "final.json", "another"]);
+            run.assert_failed(&["error: run: ", "final.json", "another"]);
             assert!(!evolver.folder().join("out").exists(), "{line}");
         }
         evolver.write(&file, &good);
@@ -756,7 +756,7 @@ fn a_noisy_run_of_the_first_version_is_checked_by_the_bits_that_it_hashed() {
     let state = state.replace("\"steps_hash\"", "\"steps_hash_v2\"");
     evolver.write("run/final.json", state.as_bytes());
     let run = evolver.run(&words("classify run"));
-    assert_refused(&run, &["error: run: best.genome", "final.json", "another"]);
+    run.assert_failed(&["error: run: best.genome", "final.json", "another"]);
 }
 
 #[test]

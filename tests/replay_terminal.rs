@@ -7,7 +7,7 @@ use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::{Grid, Pose};
 use serde_json::Value;
 use tests::program::{Evolver, Finished, Profile};
-use tests::terminal::Terminal;
+use tests::terminal::{Terminal, close_terminal_of};
 
 /// The window that terminals open with.
 const WINDOW: (u16, u16) = (24, 80);
@@ -361,6 +361,143 @@ fn without_a_terminal_nothing_is_evolved_or_played() {
     assert_eq!(evolver.files(), before);
 }
 
+/// Runs it to its end in a terminal with these variables; gives the exit code and what it sent.
+fn ended_in(
+    evolver: &Evolver,
+    window: (u16, u16),
+    variables: &[(&str, Option<&str>)],
+    arguments: &[&str],
+) -> (u32, String) {
+    let variables = variables.iter().copied();
+    let mut terminal = Terminal::start_with(evolver, window, variables, arguments);
+    let code = terminal.ended();
+    (code, terminal.sent())
+}
+
+#[test]
+fn a_terminal_without_codes_gets_plain_lines() {
+    let evolver = with_a_run();
+    for (index, term) in [Some("dumb"), Some(""), None].into_iter().enumerate() {
+        let run = |line: &str| {
+            let arguments: Vec<&str> = line.split(' ').collect();
+            let (code, sent) = ended_in(&evolver, WINDOW, &[("TERM", term)], &arguments);
+            assert!(!sent.contains('\x1b'), "{term:?}, {line}: {sent:?}");
+            (code, sent)
+        };
+        let out = format!("run-{index}");
+        for progress in ["auto", "bar"] {
+            let out = format!("{out}-{progress}");
+            let line = evolve(&out).collect::<Vec<_>>().join(" ");
+            let (code, sent) = run(&format!("{line} --progress {progress}"));
+            assert_eq!(code, 0, "{sent}");
+            assert!(sent.contains("generation 2/2  best 0."), "{sent}");
+        }
+        assert_eq!(run("classify run").0, 0);
+        assert_eq!(run("--help").0, 0);
+        assert_eq!(run("classify --nosuch").0, 2);
+        for line in ["replay run", "evolve --open"] {
+            let (code, sent) = run(line);
+            assert_eq!(code, 2, "{sent}");
+            assert!(sent.contains("it only prints lines"), "{sent}");
+        }
+        assert!(run("replay run").1.contains("--svg"));
+    }
+}
+
+#[test]
+fn a_terminal_without_utf8_gets_ascii_and_a_pipe_gets_utf8() {
+    let evolver = with_a_run();
+    let robots = |sent: &str| sent.chars().filter(|c| "><^v".contains(*c)).count();
+    for locale in [Some("C"), Some("POSIX"), Some("de_DE.ISO-8859-1"), None] {
+        let variables = [
+            ("LC_ALL", locale),
+            ("LC_CTYPE", None),
+            ("LANG", None),
+            ("NO_COLOR", Some("1")),
+        ];
+        let run = |line: &str| {
+            let arguments: Vec<&str> = line.split(' ').collect();
+            let (_, sent) = ended_in(&evolver, (60, 100), &variables, &arguments);
+            assert!(sent.is_ascii(), "{locale:?}, {line}: {sent}");
+            sent
+        };
+        let classified = run("classify run");
+        let (picture, _) = classified.split_once("\r\n\r\n").unwrap();
+        assert_eq!(robots(picture), 100, "{picture}");
+        assert!(picture.contains('.'), "{picture}");
+        run("replay --help");
+        run("classify --help");
+        assert!(run("classify gr\u{fc}n").contains("\\u{fc}"));
+        let mut terminal = Terminal::start_with(&evolver, WINDOW, variables, &["replay", "run"]);
+        terminal.wait_for("q quit");
+        terminal.after("n", "robot 0 at");
+        terminal.after(END, "step 60 of 60");
+        terminal.types("q");
+        assert_eq!(terminal.ended(), 0);
+        assert!(terminal.sent().is_ascii(), "{}", terminal.sent());
+        assert!(robots(&terminal.sent()) >= 100);
+    }
+    let piped = evolver.run_with(("LC_ALL", "C"), &["classify", "run"]);
+    assert!(piped.stdout.contains('·'), "{piped:?}");
+}
+
+#[test]
+fn no_window_is_too_small_for_any_command() {
+    let evolver = with_a_run();
+    for (rows, columns) in [(1, 1), (24, 1), (1, 20), (6, 7), (24, 20), (24, 39)] {
+        let out = format!("run-{rows}-{columns}");
+        let arguments: Vec<&str> = evolve(&out).collect();
+        for arguments in [&arguments[..], &["classify", "run"], &["--help"]] {
+            let (code, sent) = ended_in(&evolver, (rows, columns), &[], arguments);
+            assert_eq!(code, 0, "{rows}x{columns}, {arguments:?}: {sent}");
+        }
+        let mut terminal = Terminal::start(&evolver, (rows, columns), &[], &["replay", "run"]);
+        terminal.wait_until_it_shows("replay", |terminal| terminal.screen().alternate_screen());
+        terminal.types("q");
+        assert_eq!(terminal.ended(), 0, "{rows}x{columns}");
+        assert!(terminal.is_restored(), "{rows}x{columns}");
+    }
+    // A bar that is gone leaves nothing behind, also where it was cut.
+    let arguments: Vec<&str> = evolve("narrow").collect();
+    let mut terminal = Terminal::start(&evolver, (40, 20), &[], &arguments);
+    assert_eq!(terminal.ended(), 0);
+    let rows = terminal.rows().join("\n");
+    assert!(!rows.contains("/2  best"), "{rows}");
+    assert!(rows.contains("(a 15x15 grid is too"), "{rows}");
+}
+
+#[test]
+fn a_run_under_nohup_outlives_its_terminal_and_another_can_be_resumed() {
+    let evolver = Evolver::built(Profile::Debug);
+    let program = evolver.program().display();
+    let begun = |out: &str| {
+        let table = evolver.folder().join(out).join("generations.csv");
+        std::fs::read_to_string(table).is_ok_and(|table| table.lines().count() > 1)
+    };
+    let work = "--population 4 --generations 60 --repetitions 1 --steps 60 --seed 4";
+    let wait_for = |file: &str| {
+        let started = std::time::Instant::now();
+        while !evolver.folder().join(file).exists() {
+            assert!(started.elapsed().as_secs() < 120, "no {file}");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+    };
+    let line = format!("(nohup {program} evolve {work} --out kept; echo $? > kept.code) & wait");
+    close_terminal_of(&evolver, &format!("trap '' HUP; {line}"), || begun("kept"));
+    wait_for("kept.code");
+    assert_eq!(evolver.text("kept.code").trim(), "0");
+    assert!(evolver.folder().join("kept/DONE").exists());
+
+    let line = format!("trap 'exit 0' HUP; {program} evolve {work} --out cut & wait");
+    close_terminal_of(&evolver, &line, || begun("cut"));
+    let mut resumed = evolver.run(&["evolve", "--resume", "cut"]);
+    while resumed.stderr.contains("in use") {
+        resumed = evolver.run(&["evolve", "--resume", "cut"]);
+    }
+    assert_eq!(resumed.code, Some(0), "{resumed:?}");
+    assert_eq!(evolver.text("cut/DONE"), evolver.text("kept/DONE"));
+}
+
 #[test]
 fn a_trajectory_is_played_without_minds() {
     let evolver = with_a_run();
@@ -410,17 +547,18 @@ fn what_cannot_be_replayed_is_refused_with_one_message() {
     evolver.write("cut.trajectory", &exported.as_bytes()[..exported.len() / 2]);
     refused("cut.trajectory", &["cut.trajectory"]);
 
+    let damaged = |words: &[&str]| evolver.run(&["replay", "run"]).assert_failed(words);
     let mut changed: Value = serde_json::from_str(&last).unwrap();
     changed["schema_version"] = 9.into();
     evolver.write("run/final.json", changed.to_string().as_bytes());
-    refused("run", &["final.json", "schema version 9", "reads version"]);
+    damaged(&["final.json", "schema version 9", "reads version"]);
     evolver.write("run/final.json", &last.as_bytes()[..last.len() / 2]);
-    refused("run", &["final.json", "line"]);
+    damaged(&["final.json", "line"]);
     evolver.write("run/final.json", b"");
-    refused("run", &["final.json"]);
+    damaged(&["final.json"]);
     evolver.write("run/final.json", last.as_bytes());
     evolver.write("run/best.genome", &genome[..100]);
-    refused("run", &["best.genome", "too short"]);
+    damaged(&["best.genome", "too short"]);
     std::fs::remove_file(evolver.folder().join("run/DONE")).unwrap();
     refused("run", &["run", "no DONE"]);
 }

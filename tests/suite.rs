@@ -593,26 +593,17 @@ fn a_damaged_run_is_not_counted_as_done_and_every_command_names_it() {
             "no final.json"
         };
         let words = [what, &format!("delete {run}")];
-        let assert_named = |finished: &Finished, words: &[&str]| {
-            assert_eq!(finished.code, Some(1), "{finished:?}");
-            for word in words {
-                assert!(
-                    finished.stderr.contains(word),
-                    "no {word:?} in {finished:?}"
-                );
-            }
-        };
         let status = verb("status");
-        assert_named(&status, &words);
+        status.assert_failed(&words);
         assert!(
             status.stdout.contains("1 of 2 different runs done"),
             "{status:?}"
         );
         assert!(!status.stdout.contains("hash "), "{status:?}");
-        assert_named(&verb("run"), &words);
-        assert_named(&verb("report"), &words);
+        verb("run").assert_failed(&words);
+        verb("report").assert_failed(&words);
         let resumed = evolver.run(&["evolve", "--resume", &run]);
-        assert_refused(&resumed, &words);
+        resumed.assert_failed(&words);
         assert!(!resumed.stdout.contains("complete"), "{resumed:?}");
     }
     fs::remove_dir_all(evolver.folder().join(&run)).unwrap();

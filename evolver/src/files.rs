@@ -40,19 +40,25 @@ impl FileError {
     /// Whether another path would do, as opposed to something that broke.
     #[must_use]
     pub fn is_bad_path(&self) -> bool {
-        use ErrorKind as Kind;
-        matches!(
-            self.error.kind(),
-            Kind::AlreadyExists
-                | Kind::InvalidFilename
-                | Kind::InvalidInput
-                | Kind::IsADirectory
-                | Kind::NotADirectory
-                | Kind::NotFound
-                | Kind::PermissionDenied
-                | Kind::ReadOnlyFilesystem
-        )
+        is_bad_path(&self.error)
     }
+}
+
+/// Whether an error says that another path would do, as opposed to something that broke.
+#[must_use]
+pub fn is_bad_path(error: &io::Error) -> bool {
+    use ErrorKind as Kind;
+    let kinds = [
+        Kind::AlreadyExists,
+        Kind::InvalidFilename,
+        Kind::InvalidInput,
+        Kind::IsADirectory,
+        Kind::NotADirectory,
+        Kind::NotFound,
+        Kind::PermissionDenied,
+        Kind::ReadOnlyFilesystem,
+    ];
+    kinds.contains(&error.kind()) || error.get_ref().is_some_and(|cause| cause.is::<TooLarge>())
 }
 
 /// What to do where there is something already.

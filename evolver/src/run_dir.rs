@@ -100,12 +100,6 @@ pub enum RunDirError {
 }
 
 impl RunDirError {
-    /// Whether the user gave something that cannot be used, as opposed to something that broke.
-    #[must_use]
-    pub fn is_bad_input(&self) -> bool {
-        !matches!(self, Self::File(_))
-    }
-
     /// What is wrong, without what to do about it.
     #[must_use]
     pub fn cause(&self) -> &dyn std::error::Error {

@@ -67,6 +67,19 @@ pub struct Finished {
     pub stderr: String,
 }
 
+impl Finished {
+    /// Checks that something broke, and that the message has all these words.
+    ///
+    /// # Panics
+    /// If it ended otherwise.
+    pub fn assert_failed(&self, words: &[&str]) {
+        assert_eq!(self.code, Some(1), "{self:?}");
+        for word in words {
+            assert!(self.stderr.contains(word), "no {word:?} in {self:?}");
+        }
+    }
+}
+
 /// A process that is running.
 #[derive(Debug)]
 pub struct Running {
@@ -152,6 +165,23 @@ impl Evolver {
             }
         });
         Running { child, lines }
+    }
+
+    /// Starts a line of the shell in the folder.
+    ///
+    /// # Panics
+    /// If there is no shell.
+    #[must_use]
+    pub fn shell(&self, line: &str) -> Child {
+        let mut shell = Command::new("sh");
+        shell
+            .args(["-c", line])
+            .current_dir(self.folder())
+            .env_remove("CARGO")
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        shell.spawn().expect("a shell")
     }
 
     /// All files below the folder, in order.

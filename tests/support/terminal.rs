@@ -18,6 +18,8 @@ pub struct Terminal {
     keys: Box<dyn Write + Send>,
     output: Receiver<Vec<u8>>,
     parser: vt100::Parser,
+    /// Everything that it has sent.
+    sent: Vec<u8>,
     line_settings: u32,
 }
 
@@ -40,15 +42,31 @@ fn line_settings(master: &(dyn MasterPty + Send)) -> u32 {
 }
 
 impl Terminal {
-    /// Starts the program in a terminal of so many rows and columns, which knows 256 colours.
+    /// Starts the program in a terminal of so many rows and columns, which knows 256 colours and
+    /// UTF-8.
     ///
     /// # Panics
     /// If it cannot be started.
     #[must_use]
     pub fn start(
         evolver: &Evolver,
-        (rows, columns): (u16, u16),
+        window: (u16, u16),
         variables: &[(&str, &str)],
+        arguments: &[&str],
+    ) -> Self {
+        let variables = variables.iter().map(|&(name, value)| (name, Some(value)));
+        Self::start_with(evolver, window, variables, arguments)
+    }
+
+    /// The same; a variable without a value is not set.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    #[must_use]
+    pub fn start_with<'a>(
+        evolver: &Evolver,
+        (rows, columns): (u16, u16),
+        variables: impl IntoIterator<Item = (&'a str, Option<&'a str>)>,
         arguments: &[&str],
     ) -> Self {
         let pair = native_pty_system()
@@ -70,8 +88,12 @@ impl Terminal {
             command.env_remove(unwanted);
         }
         command.env("TERM", "xterm-256color");
+        command.env("LC_ALL", "C.UTF-8");
         for (name, value) in variables {
-            command.env(name, value);
+            match value {
+                Some(value) => command.env(name, value),
+                None => command.env_remove(name),
+            }
         }
         let line_settings = line_settings(&*pair.master);
         let child = pair.slave.spawn_command(command).expect("it starts");
@@ -92,6 +114,7 @@ impl Terminal {
             keys,
             output,
             parser: vt100::Parser::new(some(rows), some(columns), 0),
+            sent: Vec::new(),
             line_settings,
         }
     }
@@ -153,10 +176,21 @@ impl Terminal {
         while !holds(self) {
             let left = PATIENCE.saturating_sub(started.elapsed());
             match self.output.recv_timeout(left) {
-                Ok(bytes) => self.parser.process(&bytes),
+                Ok(bytes) => self.takes(&bytes),
                 Err(error) => panic!("no {what}, {error}:\n{}", self.screen().contents()),
             }
         }
+    }
+
+    fn takes(&mut self, bytes: &[u8]) {
+        self.parser.process(bytes);
+        self.sent.extend_from_slice(bytes);
+    }
+
+    /// Everything that the program has sent, codes and all.
+    #[must_use]
+    pub fn sent(&self) -> String {
+        String::from_utf8_lossy(&self.sent).into_owned()
     }
 
     fn wait_until(&mut self, words: &str, shown: bool) {
@@ -164,7 +198,7 @@ impl Terminal {
         while self.screen().contents().contains(words) != shown {
             let left = PATIENCE.saturating_sub(started.elapsed());
             match self.output.recv_timeout(left) {
-                Ok(bytes) => self.parser.process(&bytes),
+                Ok(bytes) => self.takes(&bytes),
                 Err(error) => panic!(
                     "{words:?} shown: {}, {error}:\n{}",
                     !shown,
@@ -207,7 +241,7 @@ impl Terminal {
             }
             assert!(started.elapsed() < PATIENCE, "it goes on");
             match self.output.recv_timeout(Duration::from_millis(20)) {
-                Ok(bytes) => self.parser.process(&bytes),
+                Ok(bytes) => self.takes(&bytes),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => {
                     std::thread::sleep(Duration::from_millis(5));
@@ -216,7 +250,7 @@ impl Terminal {
         };
         // What it wrote last is still on its way.
         while let Ok(bytes) = self.output.recv_timeout(Duration::from_millis(500)) {
-            self.parser.process(&bytes);
+            self.takes(&bytes);
         }
         status.exit_code()
     }
@@ -228,6 +262,34 @@ impl Terminal {
         !screen.alternate_screen()
             && !screen.hide_cursor()
             && line_settings(&*self.master) == self.line_settings
+    }
+}
+
+/// Runs a line of the shell in a terminal, closes the terminal once this holds, and waits for the
+/// end of the shell.
+///
+/// # Panics
+/// If it does not start or end in time.
+pub fn close_terminal_of(evolver: &Evolver, line: &str, when: impl Fn() -> bool) {
+    let pair = native_pty_system()
+        .openpty(size(24, 80))
+        .expect("a pseudo-terminal");
+    let mut command = CommandBuilder::new("sh");
+    command.args(["-c", line]);
+    command.cwd(evolver.folder());
+    let mut shell = pair.slave.spawn_command(command).expect("it starts");
+    drop(pair.slave);
+    let started = Instant::now();
+    let wait = || {
+        assert!(started.elapsed() < PATIENCE, "{line}");
+        std::thread::sleep(Duration::from_millis(2));
+    };
+    while !when() {
+        wait();
+    }
+    drop(pair.master);
+    while shell.try_wait().expect("it is our child").is_none() {
+        wait();
     }
 }
 

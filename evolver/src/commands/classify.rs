@@ -1,6 +1,7 @@
 //! `evolver classify`: what a swarm formed, and how the run went.
 
 use super::BadInput;
+use super::errors::unusable;
 use crate::files::{self, DATA_BYTES_MAX};
 use crate::finished_run::{FinishedRun, parse_final_state};
 use crate::report::structures::{self, Classified};
@@ -15,8 +16,8 @@ use std::path::Path;
 /// [`BadInput`] if there is nothing to classify.
 pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
     let (grid, poses, measures) = if path.is_dir() {
-        let finished = FinishedRun::read_and_check(path).map_err(BadInput::new)?;
-        let measures = finished.measures().map_err(BadInput::new)?;
+        let finished = FinishedRun::read_and_check(path).map_err(unusable)?;
+        let measures = finished.measures()?;
         let grid = finished.settings.scenario.grid();
         (grid, finished.final_poses, Some(measures))
     } else {
@@ -40,8 +41,8 @@ pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
 }
 
 /// The last state in a file, by what the file starts with.
-fn read_state(path: &Path) -> Result<(Grid, Vec<Pose>), BadInput> {
-    let bytes = files::read(path, DATA_BYTES_MAX).map_err(BadInput::new)?;
+fn read_state(path: &Path) -> anyhow::Result<(Grid, Vec<Pose>)> {
+    let bytes = files::read(path, DATA_BYTES_MAX).map_err(unusable)?;
     let text = std::str::from_utf8(&bytes).map_err(|_| {
         BadInput::new(format!(
             "{}: neither a final.json, nor an agent_trajectory, nor a drawing",
@@ -54,7 +55,8 @@ fn read_state(path: &Path) -> Result<(Grid, Vec<Pose>), BadInput> {
         return Err(BadInput::new(format!(
             "{}: neither a final.json, nor an agent_trajectory, nor a drawing of ▶ ▲ ◀ ▼ and ·",
             path.display()
-        )));
+        ))
+        .into());
     }
     if text.starts_with("Gen:") {
         let trajectory = Trajectory::read(text)
@@ -64,6 +66,7 @@ fn read_state(path: &Path) -> Result<(Grid, Vec<Pose>), BadInput> {
         let state = parse_final_state(path, &bytes).map_err(BadInput::new)?;
         Ok((state.grid, state.final_poses))
     } else {
-        drawing::parse(text).map_err(|error| BadInput::new(format!("{}: {error}", path.display())))
+        let drawing = drawing::parse(text);
+        Ok(drawing.map_err(|error| BadInput::new(format!("{}: {error}", path.display())))?)
     }
 }

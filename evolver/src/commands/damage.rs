@@ -1,5 +1,6 @@
 //! `evolver damage`: take a part of a structure away, or scatter it, and see what the swarm does.
 
+use super::errors::unusable;
 use super::evaluate::flag;
 use super::{BadInput, thread_pool};
 use crate::finished_run::FinishedRun;
@@ -54,7 +55,7 @@ pub struct DamageArgs {
 /// # Errors
 /// [`BadInput`] names the flag, the value and what would be valid.
 pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
-    let finished = FinishedRun::read_and_check(&arguments.run).map_err(BadInput::new)?;
+    let finished = FinishedRun::read_and_check(&arguments.run).map_err(unusable)?;
     let grid = finished.settings.scenario.grid();
     let [x0, y0, x1, y1] = flag("area", &arguments.area, corners)?;
     let about_area = |error: &dyn std::fmt::Display| {

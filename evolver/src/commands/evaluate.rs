@@ -1,5 +1,6 @@
 //! `evolver evaluate`: a genome from new starts, under the conditions it evolved in or others.
 
+use super::errors::unusable;
 use super::{BadInput, genome_file, thread_pool};
 use crate::files;
 use crate::limits::{self, Needs};
@@ -56,7 +57,7 @@ pub struct EvaluateArgs {
 pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     let file = genome_file(&arguments.genome);
     let path = file.display();
-    let bytes = files::read(&file, CONTAINER_BYTES_MAX as u64).map_err(BadInput::new)?;
+    let bytes = files::read(&file, CONTAINER_BYTES_MAX as u64).map_err(unusable)?;
     let run = conditions_beside(&file)?;
     let or_of_run = |given: &Option<String>, of_run: fn(&Settings) -> String, default: &str| {
         let of_run = || run.as_ref().map(of_run);
@@ -129,17 +130,15 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
 }
 
 /// The settings of the run that the genome came out of, if it lies in a run directory.
-fn conditions_beside(genome: &Path) -> Result<Option<Settings>, BadInput> {
+fn conditions_beside(genome: &Path) -> anyhow::Result<Option<Settings>> {
     let config = genome.with_file_name("config.toml");
-    if !files::exists(&config).map_err(BadInput::new)? {
+    if !files::exists(&config).map_err(unusable)? {
         return Ok(None);
     }
     let mut given = Given::default();
-    given.file(&config).map_err(BadInput::new)?;
+    given.file(&config).map_err(unusable)?;
     given.forget("from");
-    Settings::resolve(&given, || 0)
-        .map(Some)
-        .map_err(BadInput::new)
+    Settings::resolve(&given, || 0).map(Some).map_err(unusable)
 }
 
 /// A flag's value, or an error that names the flag.

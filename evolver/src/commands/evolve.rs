@@ -1,7 +1,8 @@
 //! `evolver evolve`: evolve a swarm, or go on with a run.
 
+use super::errors::{stopped, unusable};
 use super::replay::in_terminal;
-use super::{BadInput, stopped, thread_pool};
+use super::{BadInput, thread_pool};
 use crate::evolving::until_finished;
 use crate::exit::Exit;
 use crate::experiment::Experiment;
@@ -144,7 +145,7 @@ struct Manner {
 /// # Errors
 /// [`BadInput`] before anything is written; other errors leave a run that can be resumed.
 pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
-    let given = arguments.given().map_err(BadInput::new)?;
+    let given = arguments.given().map_err(unusable)?;
     let threads = settings::threads(&given).map_err(BadInput::new)?;
     if arguments.open {
         terminal::check().map_err(|error| BadInput::new(format!("--open: {error}")))?;
@@ -157,8 +158,9 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
         },
         path: CodePath::from_environment().map_err(BadInput::new)?,
     };
+    let stop = stop_on_signal()?;
     let (experiment, run) = match &arguments.resume {
-        Some(directory) => match RunDir::open(directory)? {
+        Some(directory) => match RunDir::open(directory).map_err(unusable)? {
             Found::Unfinished(experiment, run) => (*experiment, run),
             Found::Finished(hash) => {
                 if arguments.progress == ProgressMode::Json {
@@ -168,7 +170,7 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
                     show_line!("{} is complete; its hash is {hash}", directory.display());
                 }
                 if arguments.open {
-                    watch(directory, stop_on_signal()?)?;
+                    watch(directory, stop)?;
                 }
                 return Ok(Exit::Done);
             }
@@ -197,8 +199,8 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
                 }
             }
             .map_err(|error| match given.place("out") {
-                Some(place) => BadInput::new(format!("{place}: {error}")),
-                None => BadInput::new(error),
+                Some(place) => unusable(error).context(place.to_string()),
+                None => unusable(error),
             })?;
             if given.place("seed").is_none() && arguments.progress != ProgressMode::Json {
                 show_event!("seed {seed} (drawn)");
@@ -206,7 +208,6 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
             (experiment, run)
         }
     };
-    let stop = stop_on_signal()?;
     let finished = thread_pool(threads)?.install(|| generations(experiment, &run, manner, stop))?;
     if !finished {
         let program = summary::program();

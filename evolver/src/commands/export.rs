@@ -1,5 +1,6 @@
 //! `evolver export`: runs and genomes in the formats of other programs.
 
+use super::errors::unusable;
 use super::evaluate::flag;
 use super::replay::write_file;
 use super::{BadInput, genome_file, read_genome};
@@ -118,7 +119,7 @@ fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
         ))
         .into());
     }
-    let finished = FinishedRun::read_and_check(&arguments.from).map_err(BadInput::new)?;
+    let finished = FinishedRun::read_and_check(&arguments.from).map_err(unusable)?;
     Needs::of_recording(&finished.settings.scenario)
         .check_memory()
         .map_err(BadInput::new)?;

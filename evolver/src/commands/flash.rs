@@ -2,9 +2,10 @@
 
 use super::port::{PortArgs, failed};
 use super::read_genome;
+use crate::report::progress::bar;
 use crate::robot::Afterwards;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use std::path::PathBuf;
 
 /// Which genome, and where the robot is.
@@ -27,7 +28,10 @@ pub fn flash(arguments: &FlashArgs) -> anyhow::Result<()> {
     let port = &arguments.port;
     let mut robot = port.connect()?;
     robot.check_kernel().map_err(failed)?;
-    let bar = bar(container.len());
+    let bar = bar(
+        ProgressBar::new(container.len() as u64),
+        "{pos}/{len} bytes",
+    );
     let written = robot.while_stopped(Afterwards::Runs, &port.command("start"), |robot| {
         robot.write(&container, |bytes| bar.set_position(bytes as u64))
     });
@@ -36,10 +40,4 @@ pub fn flash(arguments: &FlashArgs) -> anyhow::Result<()> {
     let identity = robot.identify().map_err(failed)?;
     show_line!("{}: {identity}", port.name());
     Ok(())
-}
-
-fn bar(bytes: usize) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} bytes")
-        .expect("the template is well-formed");
-    ProgressBar::new(bytes as u64).with_style(style)
 }

@@ -1,10 +1,11 @@
 //! `evolver gallery`: all runs at a glance, each a step from its replay.
 
+use super::errors::{name_damaged, unusable};
 use super::evaluate::flag;
-use super::{BadInput, name_damaged, thread_pool};
+use super::thread_pool;
 use crate::exit::Exit;
 use crate::files::Existing;
-use crate::replay::gallery::{GalleryError, write};
+use crate::replay::gallery::write;
 use crate::settings::count;
 use clap::Args;
 use std::path::PathBuf;
@@ -38,10 +39,7 @@ pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
     let existing = Existing::with_overwrite(arguments.overwrite);
     let written = thread_pool(threads)?
         .install(|| write(&arguments.directories, &arguments.out, existing))
-        .map_err(|error| match error {
-            GalleryError::File(error) if !error.is_bad_path() => anyhow::Error::from(error),
-            error => BadInput::new(error).into(),
-        })?;
+        .map_err(unusable)?;
     let left_out = match written.unfinished {
         0 => String::new(),
         n => format!("; {n} that have not ended left out"),

@@ -1,15 +1,17 @@
 //! `evolver hil`: a simulated swarm with the robot on the line in it.
 
 use super::conditions::GenomeConditions;
+use super::errors::unusable;
 use super::port::{PortArgs, failed};
 use super::{BadInput, read_genome};
 use crate::exit::Exit;
 use crate::finished_run::FinishedRun;
 use crate::hil::{Course, HilError, Ran};
+use crate::report::progress;
 use crate::report::summary::shell_word;
 use crate::robot::{Afterwards, Robot, RobotError, describe, is_in_use};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use minimal_surprise_controller::{Controller, EncodedGenome};
 use minimal_surprise_sim::SeedTree;
 use std::path::{Path, PathBuf};
@@ -79,12 +81,12 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
 }
 
 /// The run that a directory holds, and the file of its genome.
-fn of_run(arguments: &HilArgs) -> Result<(Course, PathBuf), BadInput> {
+fn of_run(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
     let directory = &arguments.run;
     arguments
         .conditions
         .refuse_beside("a run directory", directory)?;
-    let finished = FinishedRun::read_and_check(directory).map_err(BadInput::new)?;
+    let finished = FinishedRun::read_and_check(directory).map_err(unusable)?;
     let course = Course {
         controller: Controller::new(&finished.genome),
         scenario: finished.settings.scenario,
@@ -94,7 +96,7 @@ fn of_run(arguments: &HilArgs) -> Result<(Course, PathBuf), BadInput> {
 }
 
 /// The run that the flags ask for: the first trial of their seed.
-fn of_genome(arguments: &HilArgs) -> Result<(Course, PathBuf), BadInput> {
+fn of_genome(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
     let bytes = read_genome(&arguments.run)?;
     let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
     let settings = arguments.conditions.settings(&encoded)?;
@@ -109,9 +111,8 @@ fn of_genome(arguments: &HilArgs) -> Result<(Course, PathBuf), BadInput> {
 /// The run with the robot, from a fresh start of it.
 fn run(course: &Course, robot: &mut Robot) -> Result<Ran, HilError<RobotError>> {
     robot.reset().map_err(HilError::Robot)?;
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} steps  {per_sec}")
-        .expect("the template is well-formed");
-    let bar = ProgressBar::new(course.scenario.steps().into()).with_style(style);
+    let bar = ProgressBar::new(course.scenario.steps().into());
+    let bar = progress::bar(bar, "{pos}/{len} steps  {per_sec}");
     let ran = course.with_robot(|reading| {
         bar.inc(1);
         robot.step(reading)

@@ -1,6 +1,7 @@
 //! `evolver import`: genome containers of the genome text of the authors' program.
 
 use super::BadInput;
+use super::errors::unusable;
 use super::evaluate::flag;
 use crate::files::{self, DATA_BYTES_MAX, FileError};
 use crate::new_dir::{NewDir, remove_abandoned};
@@ -92,8 +93,8 @@ pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
 }
 
 /// The generations in a file, with their numbers; if only one is wanted, no other has to be right.
-fn read(path: &Path, only: Option<u32>) -> Result<Vec<(u32, GenomeRows)>, BadInput> {
-    let bytes = files::read(path, DATA_BYTES_MAX).map_err(BadInput::new)?;
+fn read(path: &Path, only: Option<u32>) -> anyhow::Result<Vec<(u32, GenomeRows)>> {
+    let bytes = files::read(path, DATA_BYTES_MAX).map_err(unusable)?;
     let text = String::from_utf8_lossy(&bytes);
     let about = |error: ExchangeError| BadInput::new(format!("{}, {error}", path.display()));
     let (mut found, mut count) = (Vec::new(), 0);
@@ -112,7 +113,8 @@ fn read(path: &Path, only: Option<u32>) -> Result<Vec<(u32, GenomeRows)>, BadInp
             "--generation = {only}: {} holds generations 0 to {}",
             path.display(),
             count - 1
-        ))),
+        ))
+        .into()),
         _ => Ok(found),
     }
 }

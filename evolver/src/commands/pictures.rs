@@ -203,13 +203,8 @@ impl PictureArgs {
             write_file("gif", file, &bytes, existing)?;
         }
         if let Some(file) = &self.mp4 {
-            match film.mp4() {
-                Ok(bytes) => write_file("mp4", file, &bytes, existing)?,
-                Err(error @ (PictureError::Ffmpeg(_) | PictureError::FfmpegFailed(_))) => {
-                    return Err(error.into());
-                }
-                Err(error) => return Err(self.about(error).into()),
-            }
+            let bytes = film.mp4().map_err(|error| self.about(error))?;
+            write_file("mp4", file, &bytes, existing)?;
         }
         Ok(())
     }
@@ -226,12 +221,15 @@ impl PictureArgs {
     }
 
     /// Says which flag asked for what cannot be had.
-    fn about(&self, error: PictureError) -> BadInput {
+    fn about(&self, error: PictureError) -> anyhow::Error {
         let given = |flag: &str, value: &Option<String>| {
             let value = value.as_deref().unwrap_or_default();
             BadInput::new(format!("--{flag} = {value}: {error}"))
         };
         match &error {
+            PictureError::Encoding(_) | PictureError::Ffmpeg(_) | PictureError::FfmpegFailed(_) => {
+                return error.into();
+            }
             PictureError::NoState { .. } => given("at", &self.at),
             PictureError::NoRobot { .. } => given("robot", &self.robot),
             PictureError::TooNarrow { .. } => {
@@ -243,6 +241,7 @@ impl PictureArgs {
             }
             _ => BadInput::new(error),
         }
+        .into()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::conditions::GenomeConditions;
 use super::damage::corners;
+use super::errors::unusable;
 use super::evaluate::flag;
 use super::pictures::PictureArgs;
 use super::{BadInput, read_genome};
@@ -115,7 +116,7 @@ pub(super) fn in_terminal(
     stop: &AtomicBool,
 ) -> anyhow::Result<()> {
     terminal::play(recording, colouring, stop).map_err(|error| match error {
-        PlayError::NotATerminal => BadInput::new(format!(
+        PlayError::NotATerminal | PlayError::NoCodes(_) => BadInput::new(format!(
             "{error}; --html, --svg, --png, --gif and --mp4 write files instead"
         ))
         .into(),
@@ -153,14 +154,14 @@ pub(super) fn write_file(
     })
 }
 
-fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {
+fn recording(arguments: &ReplayArgs) -> anyhow::Result<Recording> {
     let path = &arguments.run;
     let name = path.display().to_string();
     let conditions = &arguments.conditions;
     if path.is_dir() {
         conditions.refuse_beside("a run directory", path)?;
-        let finished = FinishedRun::read_and_check(path).map_err(BadInput::new)?;
-        return of_run(arguments, &name, &finished);
+        let finished = FinishedRun::read_and_check(path).map_err(unusable)?;
+        return Ok(of_run(arguments, &name, &finished)?);
     }
     for (flag, given) in [
         ("remove", &arguments.remove),
@@ -169,16 +170,17 @@ fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {
         if given.is_some() {
             return Err(BadInput::new(format!(
                 "--{flag}: {name} is not a run directory, whose final state could be damaged"
-            )));
+            ))
+            .into());
         }
     }
-    let bytes = files::read(path, DATA_BYTES_MAX).map_err(BadInput::new)?;
+    let bytes = files::read(path, DATA_BYTES_MAX).map_err(unusable)?;
     match std::str::from_utf8(&bytes) {
         Ok(text) if text.trim_start_matches('\u{feff}').starts_with("Gen:") => {
             conditions.refuse_beside("a trajectory", path)?;
             let trajectory = Trajectory::read(text)
                 .map_err(|error| BadInput::new(format!("{name}, {error}")))?;
-            Recording::of_trajectory(&name, &trajectory).map_err(BadInput::new)
+            Ok(Recording::of_trajectory(&name, &trajectory).map_err(BadInput::new)?)
         }
         _ => of_genome(arguments, path, &name),
     }
@@ -223,7 +225,7 @@ fn check_size(arguments: &ReplayArgs, scenario: &Scenario) -> Result<(), BadInpu
 }
 
 /// The run that the flags ask for: the first trial of their seed.
-fn of_genome(arguments: &ReplayArgs, path: &Path, name: &str) -> Result<Recording, BadInput> {
+fn of_genome(arguments: &ReplayArgs, path: &Path, name: &str) -> anyhow::Result<Recording> {
     let conditions = &arguments.conditions;
     let bytes = read_genome(path)?;
     let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
@@ -238,5 +240,6 @@ fn of_genome(arguments: &ReplayArgs, path: &Path, name: &str) -> Result<Recordin
     let scenario = &settings.scenario;
     check_size(arguments, scenario)?;
     let trial = scenario.trial(seeds, 0, 0);
-    Recording::of_trial(&encoded.to_genome(), scenario, &trial, origin).map_err(BadInput::new)
+    let recording = Recording::of_trial(&encoded.to_genome(), scenario, &trial, origin);
+    Ok(recording.map_err(BadInput::new)?)
 }

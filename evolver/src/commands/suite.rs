@@ -1,7 +1,8 @@
 //! `evolver paper` and `evolver suite FILE`: many evolutions, on one machine or many.
 
+use super::errors::{Unfinished, name_damaged, stopped};
 use super::evaluate::flag;
-use super::{BadInput, Unfinished, name_damaged, stopped, thread_pool};
+use super::{BadInput, thread_pool};
 use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
 use crate::files::{self, Existing};
@@ -614,7 +615,10 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
                 .install(|| search(plan, asked, directory, manner.progress, stop, &mut damaged))?;
     }
     if !worked {
-        return stopped("the same command");
+        return match work.share {
+            Share::Whole => stopped(&command(work.read, work.choice, directory)),
+            Share::One(_) => stopped("the same command"),
+        };
     }
     // Looked at once, so that number and hash are of one moment.
     let mut hash = Sha256::new();
@@ -729,7 +733,7 @@ fn do_all(
                 Ok(Worked::Held(holder)) => held.push((run, holder)),
                 Ok(Worked::Interrupted) => return Ok(false),
                 // A disk that is full is not the fault of one run.
-                Err(error) if error.is_bad_input() => {
+                Err(error) if !matches!(error, RunDirError::File(_)) => {
                     damaged.add(&run.directory(directory), error.cause());
                 }
                 Err(error) => return Err(error.into()),

@@ -50,26 +50,11 @@ pub(super) enum Shown {
 }
 
 impl Shown {
-    /// Of a bar, `numbers` is what stands beside it.
-    pub(super) fn new(
-        mode: ProgressMode,
-        numbers: &str,
-        bar: impl FnOnce() -> ProgressBar,
-    ) -> Self {
+    /// As the mode says and standard error allows; `numbers` stand beside a bar.
+    pub(super) fn new(mode: ProgressMode, numbers: &str, of: impl FnOnce() -> ProgressBar) -> Self {
         match mode {
             ProgressMode::Auto | ProgressMode::Bar if output::stderr_is_screen() => {
-                let narrow = Term::stderr().size().1 < COLUMNS_FOR_BAR;
-                let gauge = if narrow { "" } else { "{bar:16} " };
-                let style =
-                    ProgressStyle::with_template(&format!("{gauge}{numbers}  {{wide_msg}}"))
-                        .expect("the template is well-formed");
-                let style = match output::stderr_is_ascii() {
-                    true => style.progress_chars("#-"),
-                    false => style,
-                };
-                let bar = bar().with_style(style);
-                bar.enable_steady_tick(Duration::from_millis(200));
-                Self::Bar(bar)
+                Self::Bar(bar(of(), numbers))
             }
             ProgressMode::Auto | ProgressMode::Bar | ProgressMode::Lines => Self::Lines,
             ProgressMode::Json => Self::Json,
@@ -97,6 +82,24 @@ pub fn steps_bar(scenario: &Scenario) -> ProgressBar {
             ProgressBar::hidden()
         }
     }
+}
+
+/// A bar on standard error, hidden where none can be drawn; `numbers` stand beside it.
+pub(crate) fn bar(bar: ProgressBar, numbers: &str) -> ProgressBar {
+    if !output::stderr_is_screen() {
+        return ProgressBar::hidden();
+    }
+    let is_narrow = Term::stderr().size().1 < COLUMNS_FOR_BAR;
+    let gauge = if is_narrow { "" } else { "{bar:16} " };
+    let style = ProgressStyle::with_template(&format!("{gauge}{numbers}  {{wide_msg}}"))
+        .expect("the template is well-formed");
+    let style = match output::stderr_is_ascii() {
+        true => style.progress_chars("#-"),
+        false => style,
+    };
+    let bar = bar.with_style(style);
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
 }
 
 impl Progress {

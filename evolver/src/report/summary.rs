@@ -2,6 +2,7 @@
 
 use super::structures::{self, Classified};
 use crate::experiment::{Experiment, Finding};
+use crate::output::stdout_is_ascii;
 use crate::settings::{describe, model_name};
 use console::{Style, Term};
 use minimal_surprise_controller::codec::FORMAT_VERSION;
@@ -38,7 +39,8 @@ pub fn shell_word(path: &Path) -> String {
 }
 
 /// The swarm's picture, two columns a cell, members as filled arrows (coloured on a terminal), the
-/// others hollow; where it does not fit, a line that says so.
+/// others hollow; in ASCII, where both are alike, members are starred. Where it does not fit, a line
+/// that says so.
 #[must_use]
 pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> String {
     let (rows, columns) = Term::stdout().size_checked().unwrap_or(WITHOUT_TERMINAL);
@@ -46,9 +48,10 @@ pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> S
         return format!("(a {grid} grid is too large for this terminal to be drawn)");
     }
     let member = Style::new().cyan().bold();
+    let star = if stdout_is_ascii() { '*' } else { ' ' };
     let cell = |cell: char| {
         if "▶▲◀▼".contains(cell) {
-            format!(" {}", member.apply_to(cell))
+            format!("{star}{}", member.apply_to(cell))
         } else {
             format!(" {cell}")
         }
@@ -74,7 +77,7 @@ pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> 
     let directory = shell_word(directory);
     format!(
         "{picture}\n\n\
-         structure     {structure}: {share:.0} % of the robots (filled arrows)\n\
+         structure     {structure}: {share:.0} % of the robots ({members})\n\
          best fitness  {fitness:.4}  (generation {generation}, worst of {repetitions} repetitions)\n\
          seed          {seed}\n\
          hash          {hash}\n\
@@ -86,6 +89,11 @@ pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> 
          look into the genome   {program} inspect {directory}/best.genome\n  \
          evolve it further      {program} evolve --from {directory}/best.genome\n  \
          the same run again     {program} evolve {directory}/config.toml\n",
+        members = if stdout_is_ascii() {
+            "starred"
+        } else {
+            "filled arrows"
+        },
         picture = structures::highlighted(&classified),
         structure = structures::name(&finding.structures),
         share = 100.0 * finding.share(),

@@ -10,6 +10,7 @@ pub mod screen;
 
 use super::recording::Recording;
 use super::scene::Colouring;
+use crate::output;
 use crossterm::event::{self, Event};
 use paints::Paints;
 use player::Player;
@@ -30,6 +31,9 @@ pub enum PlayError {
     /// Nobody would see it, or could press a key.
     #[error("standard output is not a terminal to play the replay in")]
     NotATerminal,
+    /// It cannot be drawn on.
+    #[error("this terminal (TERM={0}) cannot play the replay: it only prints lines")]
+    NoCodes(String),
     /// The terminal does not answer.
     #[error("the terminal: {0}")]
     Terminal(#[from] io::Error),
@@ -38,12 +42,15 @@ pub enum PlayError {
 /// Whether there is a terminal to play in.
 ///
 /// # Errors
-/// [`PlayError::NotATerminal`] if there is none.
+/// [`PlayError`] if there is none.
 pub fn check() -> Result<(), PlayError> {
-    if io::stdout().is_terminal() {
-        Ok(())
-    } else {
+    if !io::stdout().is_terminal() {
         Err(PlayError::NotATerminal)
+    } else if !output::terminal_has_codes() {
+        let term = std::env::var_os("TERM").unwrap_or_default();
+        Err(PlayError::NoCodes(term.to_string_lossy().into_owned()))
+    } else {
+        Ok(())
     }
 }
 
@@ -76,7 +83,12 @@ fn watch(
     while !stop.load(Ordering::Relaxed) {
         // Also when nothing has happened: a window that changed before its changes were listened to
         // is met with the next look. Only cells that differ are written.
-        terminal.draw(|frame| screen::draw(frame, player, paints))?;
+        terminal.draw(|frame| {
+            screen::draw(frame, player, paints);
+            if output::stdout_is_ascii() {
+                screen::to_ascii(frame.buffer_mut());
+            }
+        })?;
         let left = match player.pause() {
             Some(pause) => pause.saturating_sub(last.elapsed()).clamp(A_LOOK, PATIENCE),
             None => PATIENCE,

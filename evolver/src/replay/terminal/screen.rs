@@ -3,6 +3,7 @@
 use super::cells::{self, COLUMNS};
 use super::paints::{Paints, soft};
 use super::player::Player;
+use crate::output;
 use crate::replay::recording::Recording;
 use crate::replay::scene::{Colouring, Ink, Mark, Robot, Scene};
 use crate::report::structures::names_in_words;
@@ -10,6 +11,7 @@ use crate::settings::describe;
 use minimal_surprise_sim::Heading;
 use minimal_surprise_sim::damage::Damage;
 use ratatui::Frame;
+use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Style, Stylize};
 use ratatui::text::{Line, Span};
@@ -84,6 +86,16 @@ pub fn draw(frame: &mut Frame<'_>, player: &mut Player<'_>, paints: Paints) {
     }
     draw_time(frame, time, player);
     draw_keys(frame, keys);
+}
+
+/// Replaces what a terminal without UTF-8 cannot show, cell by cell.
+pub fn to_ascii(buffer: &mut Buffer) {
+    for cell in &mut buffer.content {
+        if !cell.symbol().is_ascii() {
+            let like = output::ascii(cell.symbol());
+            cell.set_symbol(if like.len() == 1 { &like } else { "?" });
+        }
+    }
 }
 
 /// As much of the window as is of use: what belongs together stands together.

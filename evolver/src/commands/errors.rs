@@ -1,0 +1,174 @@
+//! Which errors are whose: what the user gave cannot be used, or something broke.
+
+use crate::damaged_runs::DamagedRuns;
+use crate::exit::Exit;
+use crate::files::{FileError, is_bad_path};
+use crate::finished_run::ReadRunError;
+use crate::output;
+use crate::replay::gallery::GalleryError;
+use crate::report::summary::shell_word;
+use crate::run_dir::RunDirError;
+use crate::settings::SettingError;
+
+/// Input that cannot be used, in one message.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct BadInput(String);
+
+impl BadInput {
+    /// With whatever message says what is wrong.
+    pub fn new(message: impl ToString) -> Self {
+        Self(message.to_string())
+    }
+}
+
+/// Not all that was asked for is done; the message says how to go on.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Unfinished(pub(super) String);
+
+/// A signal has ended what was done with a robot; the message says what that leaves.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Interrupted(pub(super) String);
+
+/// How the program ends after an error.
+#[must_use]
+pub fn exit_of(error: &anyhow::Error) -> Exit {
+    if error.is::<BadInput>() {
+        Exit::BadInput
+    } else if error.is::<Unfinished>() {
+        Exit::Unfinished
+    } else if error.is::<Interrupted>() {
+        Exit::Interrupted
+    } else {
+        Exit::Failure
+    }
+}
+
+/// Work has stopped before it was done. Says why and how to go on.
+pub(super) fn stopped(go_on: &str) -> anyhow::Result<Exit> {
+    match output::lost() {
+        None => {
+            tell!("interrupted; go on with: {go_on}");
+            Ok(Exit::Interrupted)
+        }
+        Some(error) if output::is_gone(error) => Err(Unfinished(format!(
+            "nobody reads standard output any more, and not all is done; go on with: {go_on}"
+        ))
+        .into()),
+        Some(error) => anyhow::bail!("standard output: {error}; go on with: {go_on}"),
+    }
+}
+
+/// Names the runs that were left out because they are damaged; `again` is the command that does them
+/// again.
+pub(super) fn name_damaged(damaged: &DamagedRuns, again: Option<&str>) -> Exit {
+    if damaged.is_empty() {
+        return Exit::Done;
+    }
+    let directories: Vec<String> = damaged.iter().map(|(run, _)| shell_word(run)).collect();
+    for (_, error) in damaged.iter() {
+        tell!("error: {error}");
+    }
+    let again = again.map_or(String::new(), |command| {
+        let directories = directories.join(" ");
+        format!("; to do them again, delete {directories}, then: {command}")
+    });
+    tell!(
+        "{} left out: damaged, made by another version, or not to be read{again}",
+        directories.len()
+    );
+    Exit::Failure
+}
+
+/// Errors about something that the user named.
+pub(super) trait AboutInput: std::error::Error + Send + Sync + Sized + 'static {
+    /// Whether it should not have been named, or named otherwise; else something broke.
+    fn is_bad_input(&self) -> bool;
+}
+
+/// [`BadInput`] if the user named what cannot be used; the error as it is if something broke.
+pub(super) fn unusable(error: impl AboutInput) -> anyhow::Error {
+    if error.is_bad_input() {
+        BadInput::new(error).into()
+    } else {
+        error.into()
+    }
+}
+
+impl AboutInput for FileError {
+    fn is_bad_input(&self) -> bool {
+        self.is_bad_path()
+    }
+}
+
+impl AboutInput for SettingError {
+    fn is_bad_input(&self) -> bool {
+        match self {
+            Self::Unreadable { error, .. } => is_bad_path(error),
+            _ => true,
+        }
+    }
+}
+
+/// A run that is not complete was named too early; one that is, and cannot be read, is damaged.
+impl AboutInput for ReadRunError {
+    fn is_bad_input(&self) -> bool {
+        match self {
+            Self::NotComplete { .. } => true,
+            Self::File(error) => error.is_bad_input(),
+            _ => false,
+        }
+    }
+}
+
+impl AboutInput for RunDirError {
+    fn is_bad_input(&self) -> bool {
+        match self {
+            Self::Exists(_) | Self::NotARun { .. } => true,
+            Self::File(error) => error.is_bad_input(),
+            _ => false,
+        }
+    }
+}
+
+impl AboutInput for GalleryError {
+    fn is_bad_input(&self) -> bool {
+        match self {
+            Self::Empty(_) | Self::Exists(_) | Self::Page { .. } => true,
+            Self::Run(error) => error.is_bad_input(),
+            Self::File(error) => error.is_bad_input(),
+            Self::World { .. } | Self::Damaged(_) => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::ErrorKind;
+    use std::path::Path;
+
+    #[test]
+    fn a_wrong_name_is_bad_input_and_a_broken_disk_is_a_failure() {
+        let cases = [
+            (ErrorKind::NotFound, Exit::BadInput),
+            (ErrorKind::PermissionDenied, Exit::BadInput),
+            (ErrorKind::IsADirectory, Exit::BadInput),
+            (ErrorKind::StorageFull, Exit::Failure),
+            (ErrorKind::QuotaExceeded, Exit::Failure),
+            (ErrorKind::OutOfMemory, Exit::Failure),
+            (ErrorKind::Other, Exit::Failure),
+        ];
+        for (kind, exit) in cases {
+            let file = || FileError::at(Path::new("a file"))(kind.into());
+            assert_eq!(exit_of(&unusable(file())), exit, "{kind}");
+            assert_eq!(exit_of(&unusable(RunDirError::File(file()))), exit);
+            assert_eq!(exit_of(&unusable(ReadRunError::File(file()))), exit);
+            assert_eq!(exit_of(&unusable(GalleryError::File(file()))), exit);
+            let about = unusable(file()).context("--out = a file");
+            assert_eq!(exit_of(&about), exit, "{about:#}");
+        }
+    }
+}
