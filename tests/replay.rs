@@ -2,6 +2,8 @@
 //!
 //! `UPDATE_SNAPSHOTS=1` writes the files in `snapshots/` anew; look at them before they are kept.
 
+use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
+use minimal_surprise_controller::{EncodedGenome, Provenance};
 use minimal_surprise_sim::Pose;
 use minimal_surprise_sim::exchange::Trajectory;
 use std::fs;
@@ -581,6 +583,24 @@ fn numbers_that_cannot_be_are_refused_in_every_file_of_a_run() {
         assert!(!evolver.folder().join("a.svg").exists(), "{file}");
         evolver.write(&file, &good);
     }
+    let good = evolver.read("run/best.genome");
+    let genome = EncodedGenome::decode(&good).expect("it is a genome");
+    let mut buffer = [0; CONTAINER_BYTES_MAX];
+    let spoilt = codec::encode(
+        &genome.to_genome(),
+        Provenance {
+            matched_bits: 3,
+            scored_bits: 2,
+            ..genome.provenance()
+        },
+        &mut buffer,
+    );
+    evolver.write("run/best.genome", spoilt.expect("it fits"));
+    let run = evolver.run(&words("replay run --svg a.svg"));
+    assert!(run.stderr.contains("more matched bits"), "{run:?}");
+    let run = evolver.run(&words("inspect run"));
+    assert!(run.stdout.contains("impossible (3 of 2 bits)"), "{run:?}");
+    evolver.write("run/best.genome", &good);
     replay(&evolver, "run --what fitness --svg a.svg");
     evolver.write("run/DONE", b"zzz\n");
     let resumed = evolver.run(&["evolve", "--resume", "run"]);

@@ -720,6 +720,34 @@ fn all_damaged_runs_are_named_and_the_others_are_done_shown_and_reported() {
 }
 
 #[test]
+fn a_run_with_a_damaged_checkpoint_is_named_and_the_others_are_done() {
+    let evolver = with_the_suite();
+    assert_eq!(evolver.run(&RUN).code, Some(0));
+    let hashes = evolver.text("suite/hashes.txt");
+    let runs: Vec<&str> = hashes.lines().map(|line| &line[..16]).collect();
+    let runs_of_suite = evolver.folder().join("suite/runs");
+    fs::remove_dir_all(runs_of_suite.join(runs[1])).unwrap();
+    for file in ["DONE", "best.genome", "final.json"] {
+        fs::remove_file(runs_of_suite.join(runs[0]).join(file)).unwrap();
+    }
+    evolver.write(&format!("suite/runs/{}/checkpoint", runs[0]), b"cut");
+    for (verb, shown) in [
+        ("status", "4 of 6 different runs done"),
+        ("run", "5 of 6 runs done"),
+    ] {
+        let run = evolver.run(&["suite", "own.toml", verb, "--out", "suite"]);
+        assert_eq!(run.code, Some(1), "{run:?}");
+        assert!(run.stdout.contains(shown), "{run:?}");
+        let of_it = |line: &str| line.contains(runs[0]) && line.contains("checkpoint is damaged");
+        assert!(run.stderr.lines().any(of_it), "{run:?}");
+        let again = format!("delete suite/runs/{}, then: ", runs[0]);
+        assert!(run.stderr.contains(&again), "{run:?}");
+    }
+    fs::remove_dir_all(runs_of_suite.join(runs[0])).unwrap();
+    assert_eq!(hashes_after(&evolver), hashes);
+}
+
+#[test]
 fn a_report_of_no_run_at_all_is_refused() {
     let evolver = with_the_suite();
     let report = ["suite", "own.toml", "report", "--out", "siute"];

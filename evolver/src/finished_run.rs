@@ -499,6 +499,9 @@ impl FinishedRun {
         if provenance.generation != settings.generations - 1 {
             return inconsistent("best.genome is not of the last generation of config.toml");
         }
+        if provenance.matched_bits > provenance.scored_bits {
+            return inconsistent("best.genome has more matched bits than scored ones");
+        }
         let meta_path = path.join("meta.json");
         let meta = serde_json::from_slice(&files::read(&meta_path, TEXT_BYTES_MAX)?);
         let meta: MetaFile = meta.map_err(|error| ReadRunError::Json {

@@ -101,6 +101,15 @@ impl RunDirError {
     pub fn is_bad_input(&self) -> bool {
         !matches!(self, Self::File(_))
     }
+
+    /// What is wrong, without what to do about it.
+    #[must_use]
+    pub fn cause(&self) -> &dyn std::error::Error {
+        match self {
+            Self::Damaged(error) => error.cause(),
+            other => other,
+        }
+    }
 }
 
 const CHECKPOINT: &str = "checkpoint";
@@ -189,25 +198,7 @@ impl RunDir {
         if let Some(hash) = finished(path)? {
             return Ok(Found::Finished(hash));
         }
-        let checkpoint = path.join(CHECKPOINT);
-        if !files::exists(&checkpoint)? {
-            return Err(missing(CHECKPOINT));
-        }
-        let mut given = Given::default();
-        given.file(&config)?;
-        // The first population is in the checkpoint; its ancestor need not exist any more.
-        given.forget("from");
-        let settings = Settings::resolve(&given, || 0)?;
-        let settings_text =
-            String::from_utf8_lossy(&files::read(&config, TEXT_BYTES_MAX)?).into_owned();
-        let bytes = files::read(&checkpoint, DATA_BYTES_MAX)?;
-        let experiment = checkpoint::decode(&bytes, settings, &settings_text).map_err(|error| {
-            RunDirError::Checkpoint {
-                path: checkpoint,
-                error,
-            }
-        })?;
-        let spent = TimeSpent::read(path)?;
+        let (experiment, settings_text, spent) = unfinished(path)?;
         let run = Self {
             path: path.to_owned(),
             settings_text,
@@ -216,6 +207,14 @@ impl RunDir {
             _lock: Some(lock),
         };
         Ok(Found::Unfinished(Box::new(experiment), run))
+    }
+
+    /// Whether a run that is not complete can be gone on with.
+    ///
+    /// # Errors
+    /// [`RunDirError`] if it cannot.
+    pub fn check_unfinished(path: &Path) -> Result<(), RunDirError> {
+        unfinished(path).map(drop)
     }
 
     /// For a run that others may be doing at the same time, unseen where the file system knows no
@@ -288,6 +287,31 @@ impl RunDir {
     fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
+}
+
+/// What a run that is not complete goes on from.
+fn unfinished(path: &Path) -> Result<(Experiment, String, TimeSpent), RunDirError> {
+    let (config, checkpoint) = (path.join(CONFIG), path.join(CHECKPOINT));
+    if !files::exists(&checkpoint)? {
+        return Err(RunDirError::NotARun {
+            path: path.to_owned(),
+            missing: CHECKPOINT,
+        });
+    }
+    let read = |path: &Path, most| files::read(path, most).map_err(ReadRunError::from);
+    let mut given = Given::default();
+    given.file(&config)?;
+    // The first population is in the checkpoint; its ancestor need not exist any more.
+    given.forget("from");
+    let settings = Settings::resolve(&given, || 0)?;
+    let text = String::from_utf8_lossy(&read(&config, TEXT_BYTES_MAX)?).into_owned();
+    let experiment = checkpoint::decode(&read(&checkpoint, DATA_BYTES_MAX)?, settings, &text)
+        .map_err(|error| RunDirError::Checkpoint {
+            path: checkpoint,
+            error,
+        })?;
+    let spent = TimeSpent::read(path).map_err(ReadRunError::from)?;
+    Ok((experiment, text, spent))
 }
 
 /// The hash of a complete run; what is not needed any more is removed.

@@ -96,7 +96,7 @@ fn name_damaged(damaged: &DamagedRuns, again: Option<&str>) -> Exit {
         format!("; to do them again, delete {directories}, then: {command}")
     });
     tell!(
-        "{} left out: damaged, made by another version, or not to be read{again}",
+        "{} left out: damaged, unreadable, or made by another version{again}",
         directories.len()
     );
     Exit::Failure

@@ -441,6 +441,19 @@ fn in_words(number: f64) -> String {
     }
 }
 
+/// Looks whether a run that is not complete can be gone on with.
+fn check_begun(run: &PlannedRun, suite: &Path, damaged: &mut DamagedRuns) {
+    let is_begun = || matches!(progress(run, suite), Ok(Progress::Begun));
+    let directory = run.directory(suite);
+    // Another process may have completed it meanwhile.
+    if is_begun()
+        && let Err(error) = RunDir::check_unfinished(&directory)
+        && is_begun()
+    {
+        damaged.add(&directory, error.cause());
+    }
+}
+
 /// Shows how many runs are done, and gives the damaged ones back.
 fn print_status(plan: &Plan, directory: &Path) -> Result<DamagedRuns, RunDirError> {
     let mut damaged = DamagedRuns::default();
@@ -454,6 +467,7 @@ fn print_status(plan: &Plan, directory: &Path) -> Result<DamagedRuns, RunDirErro
         for settings in experiment.settings() {
             let (mut done, mut begun, mut spoilt) = (0, 0, 0);
             for run in settings.runs() {
+                check_begun(&run, directory, &mut damaged);
                 if damaged.contains(&run.directory(directory)) {
                     spoilt += 1;
                     continue;
@@ -705,7 +719,9 @@ fn do_all(
                 return Ok(None);
             }
             // A disk that is full is not the fault of one run.
-            Err(error) if error.is_bad_input() => damaged.add(&run.directory(directory), error),
+            Err(error) if error.is_bad_input() => {
+                damaged.add(&run.directory(directory), error.cause());
+            }
             Err(error) => {
                 shown.end();
                 return Err(error.into());

@@ -133,6 +133,9 @@ pub fn genome(encoded: &EncodedGenome<'_>, file_bytes: usize) -> String {
         "fitness",
         match provenance.scored_bits {
             0 => "unknown".to_owned(),
+            bits if provenance.matched_bits > bits => {
+                format!("impossible ({} of {bits} bits)", provenance.matched_bits)
+            }
             bits => format!(
                 "{:.4} ({} of {bits} bits)",
                 provenance.matched_bits as f64 / bits as f64,

@@ -98,7 +98,7 @@ pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
     if !report.damaged.is_empty() {
         let runs: Vec<String> = report.damaged.iter().map(|id| format!("`{id}`")).collect();
         let line = format!(
-            "Damaged, or not to be read, and left out of everything below: {}, {}.",
+            "Left out of everything below, because they are damaged or unreadable: {}, {}.",
             plural(runs.len(), "run"),
             runs.join(", ")
         );

@@ -957,3 +957,47 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
         rows,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_is_compared_with_the_papers_share_of_the_same_runs() {
+        let shares = Distribution {
+            source: "Table 5".to_owned(),
+            also: None,
+            experiment: "densities".to_owned(),
+            setting: "C, 20x20".to_owned(),
+            of: Of::Structures,
+            runs: 50,
+            note: None,
+            percent: [("line".to_owned(), 24.0)].into(),
+        };
+        assert_eq!(Among::LineRuns.of_paper(&shares), 12);
+        assert_eq!(Among::AllRuns.of_paper(&shares), 50);
+    }
+
+    #[test]
+    fn a_table_says_of_what_its_percentages_are() {
+        let shared = [Shared {
+            name: "a setting".to_owned(),
+            setting: "a setting".to_owned(),
+            counted: String::new(),
+            runs: vec![vec!["line".to_owned()]],
+            of: Of::Structures,
+            paper: None,
+        }];
+        let categories = ["line".to_owned()];
+        let all = [
+            Counted::TiedRuns,
+            Counted::RunsAndGenomes,
+            Counted::TiedStarts,
+        ];
+        for counted in all {
+            let (id, source, title) = Default::default();
+            let table = share_table(id, source, title, counted, &shared, &categories);
+            assert_eq!(table.notes, [counted.note()]);
+        }
+    }
+}
