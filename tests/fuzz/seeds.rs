@@ -194,7 +194,9 @@ fn conversation(container: &[u8]) -> (Vec<u8>, Vec<u8>) {
 
 fn payload(frame: &[u8]) -> Vec<u8> {
     let mut decoder = Decoder::new();
-    frame.iter().for_each(|&byte| drop(decoder.feed(byte)));
+    for &byte in frame {
+        decoder.feed(byte);
+    }
     decoder.payload().to_vec()
 }
 
