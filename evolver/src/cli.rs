@@ -115,11 +115,11 @@ fn arguments() -> Cli {
     let matches = Cli::command().color(colours).try_get_matches();
     let parsed = matches.and_then(|matches| Cli::from_arg_matches(&matches));
     parsed.unwrap_or_else(|error| {
-        let printed = error.print();
         if error.use_stderr() {
+            tell!("{}", error.render().to_string().trim_end());
             Exit::BadInput.now();
         }
-        match printed {
+        match error.print() {
             Ok(()) => Exit::Done.now(),
             Err(error) => output::end(&error),
         }

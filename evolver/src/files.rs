@@ -1,5 +1,6 @@
 //! Files that are never half-written: written beside, synced, then renamed.
 
+use crate::text;
 use sha2::{Digest, Sha256};
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -270,6 +271,16 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
         Ok(bytes)
     };
     read().map_err(FileError::at(path))
+}
+
+/// Reads a whole text file of at most `most` bytes, whatever program saved it: see
+/// [`text::decode`].
+///
+/// # Errors
+/// [`FileError`] names it.
+pub fn read_text(path: &Path, most: u64) -> Result<String, FileError> {
+    text::decode(&read(path, most)?)
+        .map_err(|error| FileError::at(path)(io::Error::new(io::ErrorKind::InvalidData, error)))
 }
 
 #[cfg(test)]

@@ -193,13 +193,13 @@ impl RunDir {
         if !files::exists(&checkpoint)? {
             return Err(missing(CHECKPOINT));
         }
+        // Editors may change line ends; the checkpoint has the text as it was written.
+        let settings_text = files::read_text(&config, TEXT_BYTES_MAX)?;
         let mut given = Given::default();
-        given.file(&config)?;
+        given.text(&config, &settings_text)?;
         // The first population is in the checkpoint; its ancestor need not exist any more.
         given.forget("from");
         let settings = Settings::resolve(&given, || 0)?;
-        let settings_text =
-            String::from_utf8_lossy(&files::read(&config, TEXT_BYTES_MAX)?).into_owned();
         let bytes = files::read(&checkpoint, DATA_BYTES_MAX)?;
         let experiment = checkpoint::decode(&bytes, settings, &settings_text).map_err(|error| {
             RunDirError::Checkpoint {

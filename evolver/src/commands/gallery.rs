@@ -6,6 +6,7 @@ use crate::exit::Exit;
 use crate::files::Existing;
 use crate::replay::gallery::write;
 use crate::settings::count;
+use crate::text::terminal_path;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -45,7 +46,7 @@ pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
     };
     show_line!(
         "{} ({} runs, {:.1} MB{left_out})",
-        written.index.display(),
+        terminal_path(&written.index),
         written.runs,
         written.bytes as f64 / 1e6
     );

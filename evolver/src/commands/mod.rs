@@ -23,8 +23,8 @@ use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
 use crate::files;
 use crate::output;
-use crate::report::summary::shell_word;
 use crate::run_dir::RunDirError;
+use crate::text::shell_path;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use std::path::{Path, PathBuf};
@@ -87,7 +87,7 @@ fn name_damaged(damaged: &DamagedRuns, again: Option<&str>) -> Exit {
     if damaged.is_empty() {
         return Exit::Done;
     }
-    let directories: Vec<String> = damaged.iter().map(|(run, _)| shell_word(run)).collect();
+    let directories: Vec<String> = damaged.iter().map(|(run, _)| shell_path(run)).collect();
     for (_, error) in damaged.iter() {
         tell!("error: {error}");
     }
