@@ -496,6 +496,8 @@ fn an_exported_genome_has_the_same_bytes_in_c_and_rust() {
             "run/best.genome",
             "--format",
             format,
+            "--name",
+            "GENOME",
             "--out",
             name,
         ];
@@ -507,7 +509,7 @@ fn an_exported_genome_has_the_same_bytes_in_c_and_rust() {
     evolver.write(
         "printer.c",
         b"#include <stdio.h>\n#include \"genome.h\"\n#include \"genome.h\"\nint main(void) {\n\
-          return fwrite(minimal_surprise_genome, sizeof minimal_surprise_genome, 1, stdout) != 1;\n}\n",
+          return fwrite(GENOME, sizeof GENOME, 1, stdout) != 1;\n}\n",
     );
     let flags = ["-std=c99", "-Wall", "-Werror", "-o", "printer", "printer.c"];
     assert_eq!(printed_by(&evolver, "cc", &flags), container);

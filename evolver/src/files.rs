@@ -1,5 +1,6 @@
 //! Files that are never half-written: written beside, synced, then renamed.
 
+use crate::text::{self, TextError};
 use sha2::{Digest, Sha256};
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -40,25 +41,21 @@ impl FileError {
     /// Whether another path would do, as opposed to something that broke.
     #[must_use]
     pub fn is_bad_path(&self) -> bool {
-        is_bad_path(&self.error)
+        use ErrorKind as Kind;
+        let kinds = [
+            Kind::AlreadyExists,
+            Kind::InvalidFilename,
+            Kind::InvalidInput,
+            Kind::IsADirectory,
+            Kind::NotADirectory,
+            Kind::NotFound,
+            Kind::PermissionDenied,
+            Kind::ReadOnlyFilesystem,
+        ];
+        let cause = self.error.get_ref();
+        kinds.contains(&self.error.kind())
+            || cause.is_some_and(|cause| cause.is::<TooLarge>() || cause.is::<TextError>())
     }
-}
-
-/// Whether an error says that another path would do, as opposed to something that broke.
-#[must_use]
-pub fn is_bad_path(error: &io::Error) -> bool {
-    use ErrorKind as Kind;
-    let kinds = [
-        Kind::AlreadyExists,
-        Kind::InvalidFilename,
-        Kind::InvalidInput,
-        Kind::IsADirectory,
-        Kind::NotADirectory,
-        Kind::NotFound,
-        Kind::PermissionDenied,
-        Kind::ReadOnlyFilesystem,
-    ];
-    kinds.contains(&error.kind()) || error.get_ref().is_some_and(|cause| cause.is::<TooLarge>())
 }
 
 /// What to do where there is something already.
@@ -276,6 +273,16 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
         Ok(bytes)
     };
     read().map_err(FileError::at(path))
+}
+
+/// Reads a whole text file of at most `most` bytes, whatever program saved it: see
+/// [`text::decode`].
+///
+/// # Errors
+/// [`FileError`] names it.
+pub fn read_text(path: &Path, most: u64) -> Result<String, FileError> {
+    text::decode(&read(path, most)?)
+        .map_err(|error| FileError::at(path)(io::Error::new(io::ErrorKind::InvalidData, error)))
 }
 
 #[cfg(test)]

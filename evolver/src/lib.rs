@@ -35,5 +35,6 @@ pub mod settings;
 pub mod signals;
 pub mod steps_hash;
 pub mod suite;
+pub mod text;
 pub mod time_spent;
 pub mod usage;

@@ -8,6 +8,7 @@
 
 use crate::exit::Exit;
 use crate::signals;
+use crate::text::terminal_lines;
 use std::borrow::Cow;
 use std::env;
 use std::fmt::Arguments;
@@ -174,8 +175,8 @@ pub(crate) fn is_gone(error: &io::Error) -> bool {
 
 /// Writes to standard error. Nobody could be told that it failed.
 pub(crate) fn tell(text: Arguments<'_>) {
-    // In one piece: other processes write there, too.
-    let text = text.to_string();
+    // In one piece: other processes write there, too. Names and paths may hold anything.
+    let text = terminal_lines(&text.to_string());
     let _ = stderr().write_all(for_stderr(&text).as_bytes());
 }
 

@@ -297,17 +297,18 @@ fn unfinished(path: &Path) -> Result<(Experiment, String, TimeSpent), RunDirErro
             missing: CHECKPOINT,
         });
     }
-    let read = |path: &Path, most| files::read(path, most).map_err(ReadRunError::from);
+    // Editors may change line ends; the checkpoint has the text as it was written.
+    let text = files::read_text(&config, TEXT_BYTES_MAX).map_err(ReadRunError::from)?;
     let mut given = Given::default();
-    given.file(&config)?;
+    given.text(&config, &text)?;
     // The first population is in the checkpoint; its ancestor need not exist any more.
     given.forget("from");
     let settings = Settings::resolve(&given, || 0)?;
     Needs::of_evolution(&settings, limits::threads(None)).check_memory()?;
-    let text = String::from_utf8_lossy(&read(&config, TEXT_BYTES_MAX)?).into_owned();
     let most = limits::most(limits::checkpoint_bytes(&settings));
-    let experiment = checkpoint::decode(&read(&checkpoint, most)?, settings, &text)
-        .map_err(|error| RunDirError::Checkpoint {
+    let bytes = files::read(&checkpoint, most).map_err(ReadRunError::from)?;
+    let experiment =
+        checkpoint::decode(&bytes, settings, &text).map_err(|error| RunDirError::Checkpoint {
             path: checkpoint,
             error,
         })?;

@@ -3,6 +3,8 @@
 //!
 //! Every value remembers where it was given, so that an error can name the place.
 
+use crate::files::{self, FileError, TEXT_BYTES_MAX};
+use crate::text::path_of_text;
 use minimal_surprise_controller::{
     DecodeError, EncodedGenome, Genome, MutationRate, Prediction, SensorModel, Template, Topology,
 };
@@ -97,13 +99,8 @@ pub enum SettingError {
         error: Box<toml::de::Error>,
     },
     /// The file cannot be read.
-    #[error("{}: {error}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        error: std::io::Error,
-    },
+    #[error(transparent)]
+    Unreadable(#[from] FileError),
 }
 
 /// Values as they were given, by name.
@@ -133,11 +130,15 @@ impl Given {
     /// # Errors
     /// [`SettingError`] if the file cannot be read, is not TOML, or has unknown keys.
     pub fn file(&mut self, path: &Path) -> Result<(), SettingError> {
-        let text = std::fs::read_to_string(path).map_err(|error| SettingError::Unreadable {
-            path: path.to_owned(),
-            error,
-        })?;
-        let table = toml::de::DeTable::parse(&text).map_err(|error| SettingError::Toml {
+        self.text(path, &files::read_text(path, TEXT_BYTES_MAX)?)
+    }
+
+    /// Adds the values of a TOML text, likewise; the path is for errors.
+    ///
+    /// # Errors
+    /// [`SettingError`] if it is not TOML, or has unknown keys.
+    pub fn text(&mut self, path: &Path, text: &str) -> Result<(), SettingError> {
+        let table = toml::de::DeTable::parse(text).map_err(|error| SettingError::Toml {
             path: path.to_owned(),
             error: Box::new(error),
         })?;
@@ -311,7 +312,7 @@ impl Settings {
         let generations = given.value("generations", 100, |text| count(text, COUNT_MAX))?;
         let repetitions = given.value("repetitions", 10, |text| count(text, COUNT_MAX))?;
         let from = given.value("from", None, |text| {
-            read_genome_for(Path::new(text), topology).map(Some)
+            read_genome_for(&path_of_text(text), topology).map(Some)
         })?;
         let from_path = given.value("from", None, |text| Ok(Some(text.to_owned())))?;
         let seed = match given.place("seed") {
@@ -397,7 +398,7 @@ pub fn out(given: &Given) -> Option<PathBuf> {
     given
         .values
         .get("out")
-        .map(|(value, _)| PathBuf::from(value))
+        .map(|(value, _)| path_of_text(value))
 }
 
 /// A string as it stands; a number without its underscores.

@@ -5,6 +5,7 @@ use super::errors::unusable;
 use crate::files::{self, DATA_BYTES_MAX};
 use crate::finished_run::{FinishedRun, parse_final_state};
 use crate::report::structures::{self, Classified};
+use crate::text::{self, TextError};
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::structures::classify as find_structures;
 use minimal_surprise_sim::{Grid, Pose, drawing};
@@ -43,13 +44,15 @@ pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
 /// The last state in a file, by what the file starts with.
 fn read_state(path: &Path) -> anyhow::Result<(Grid, Vec<Pose>)> {
     let bytes = files::read(path, DATA_BYTES_MAX).map_err(unusable)?;
-    let text = std::str::from_utf8(&bytes).map_err(|_| {
-        BadInput::new(format!(
-            "{}: neither a final.json, nor an agent_trajectory, nor a drawing",
-            path.display()
-        ))
+    let text = text::decode(&bytes).map_err(|error| {
+        BadInput::new(match error {
+            TextError::Utf16 => format!("{}: {error}", path.display()),
+            _ => format!(
+                "{}: neither a final.json, nor an agent_trajectory, nor a drawing: {error}",
+                path.display()
+            ),
+        })
     })?;
-    let text = text.trim_start_matches('\u{feff}');
     if !text.chars().any(|c| "▶▲◀▼▷△◁▽·{".contains(c)) && !text.starts_with("Gen:")
     {
         return Err(BadInput::new(format!(
@@ -59,14 +62,14 @@ fn read_state(path: &Path) -> anyhow::Result<(Grid, Vec<Pose>)> {
         .into());
     }
     if text.starts_with("Gen:") {
-        let trajectory = Trajectory::read(text)
+        let trajectory = Trajectory::read(&text)
             .map_err(|error| BadInput::new(format!("{}, {error}", path.display())))?;
         Ok((trajectory.grid(), trajectory.final_poses().to_vec()))
     } else if text.trim_start().starts_with('{') {
-        let state = parse_final_state(path, &bytes).map_err(BadInput::new)?;
+        let state = parse_final_state(path, text.as_bytes()).map_err(BadInput::new)?;
         Ok((state.grid, state.final_poses))
     } else {
-        let drawing = drawing::parse(text);
+        let drawing = drawing::parse(&text);
         Ok(drawing.map_err(|error| BadInput::new(format!("{}: {error}", path.display())))?)
     }
 }

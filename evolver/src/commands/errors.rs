@@ -2,13 +2,13 @@
 
 use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
-use crate::files::{FileError, is_bad_path};
+use crate::files::FileError;
 use crate::finished_run::ReadRunError;
 use crate::output;
 use crate::replay::gallery::GalleryError;
-use crate::report::summary::shell_word;
 use crate::run_dir::RunDirError;
 use crate::settings::SettingError;
+use crate::text::shell_path;
 
 /// Input that cannot be used, in one message.
 #[derive(Debug, thiserror::Error)]
@@ -67,7 +67,7 @@ pub(super) fn name_damaged(damaged: &DamagedRuns, again: Option<&str>) -> Exit {
     if damaged.is_empty() {
         return Exit::Done;
     }
-    let directories: Vec<String> = damaged.iter().map(|(run, _)| shell_word(run)).collect();
+    let directories: Vec<String> = damaged.iter().map(|(run, _)| shell_path(run)).collect();
     for (_, error) in damaged.iter() {
         tell!("error: {error}");
     }
@@ -106,7 +106,7 @@ impl AboutInput for FileError {
 impl AboutInput for SettingError {
     fn is_bad_input(&self) -> bool {
         match self {
-            Self::Unreadable { error, .. } => is_bad_path(error),
+            Self::Unreadable(error) => error.is_bad_input(),
             _ => true,
         }
     }

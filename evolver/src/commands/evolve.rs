@@ -18,6 +18,7 @@ use crate::report::summary;
 use crate::run_dir::{Found, RunDir};
 use crate::settings::{self, Given, SettingError, Settings};
 use crate::signals::stop_on_signal;
+use crate::text::{shell_path, terminal_path, text_of_path};
 use clap::{Args, ValueEnum};
 use minimal_surprise_sim::{Engine, Path as CodePath};
 use std::path::{Path, PathBuf};
@@ -64,7 +65,7 @@ pub struct EvolveArgs {
     mutation: Option<String>,
     /// Start from a genome and its mutants.
     #[arg(long, value_name = "GENOME")]
-    from: Option<String>,
+    from: Option<PathBuf>,
     /// Root of all random numbers; drawn and printed if not given.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     seed: Option<String>,
@@ -73,7 +74,7 @@ pub struct EvolveArgs {
     threads: Option<String>,
     /// Directory of the run; must not exist [default: a new one in runs/].
     #[arg(long, value_name = "DIR")]
-    out: Option<String>,
+    out: Option<PathBuf>,
     /// Go on with a run that was interrupted, under the settings in its directory.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["config", "grid", "robots",
         "sensor_model", "noise", "predefine", "predefine_partly", "population", "generations",
@@ -106,13 +107,14 @@ impl EvolveArgs {
             ("repetitions", &self.repetitions),
             ("steps", &self.steps),
             ("mutation", &self.mutation),
-            ("from", &self.from),
             ("seed", &self.seed),
             ("threads", &self.threads),
-            ("out", &self.out),
         ];
         for (key, value) in flags {
             given.flag(key, value.as_deref());
+        }
+        for (key, path) in [("from", &self.from), ("out", &self.out)] {
+            given.flag(key, path.as_deref().map(text_of_path).as_deref());
         }
         if let Some(path) = &self.config {
             given.file(path)?;
@@ -164,10 +166,13 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
             Found::Unfinished(experiment, run) => (*experiment, run),
             Found::Finished(hash) => {
                 if arguments.progress == ProgressMode::Json {
-                    let done = serde_json::json!({"event": "done", "hash": hash, "run": directory});
+                    let done = serde_json::json!({"event": "done", "hash": hash, "run": text_of_path(directory)});
                     show_line!("{done}");
                 } else {
-                    show_line!("{} is complete; its hash is {hash}", directory.display());
+                    show_line!(
+                        "{} is complete; its hash is {hash}",
+                        terminal_path(directory)
+                    );
                 }
                 if arguments.open {
                     watch(directory, stop)?;
@@ -211,7 +216,7 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
     let finished = thread_pool(threads)?.install(|| generations(experiment, &run, manner, stop))?;
     if !finished {
         let program = summary::program();
-        let directory = summary::shell_word(run.path());
+        let directory = shell_path(run.path());
         return stopped(&format!("{program} evolve --resume {directory}"));
     }
     if arguments.open {
@@ -226,10 +231,7 @@ fn draw_seed() -> u64 {
 
 /// Plays a run that has ended.
 fn watch(directory: &Path, stop: &AtomicBool) -> anyhow::Result<()> {
-    let recording = Recording::of_run(
-        &directory.display().to_string(),
-        &FinishedRun::read(directory)?,
-    )?;
+    let recording = Recording::of_run(&terminal_path(directory), &FinishedRun::read(directory)?)?;
     in_terminal(&recording, Colouring::default(), stop)
 }
 
@@ -260,7 +262,7 @@ fn generations(
             "event": "done",
             "fitness": finding.outcome.fitness(),
             "hash": finding.hash.to_string(),
-            "run": run.path(),
+            "run": text_of_path(run.path()),
         });
         settings::add_seed(&mut done, experiment.settings().seed);
         show_line!("{done}");

@@ -7,14 +7,15 @@ use super::{BadInput, genome_file, read_genome};
 use crate::files::Existing;
 use crate::finished_run::FinishedRun;
 use crate::limits::Needs;
-use crate::report::embedding::{c_header, intel_hex, probe_rs_line, rust_source, slot};
+use crate::report::embedding::{self, c_header, intel_hex, probe_rs_line, rust_source, slot};
 use crate::settings::count;
+use crate::text::{checked_identifier, terminal_path};
 use clap::{Args, ValueEnum};
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_slots::MADE_WRITE_COUNT_MAX;
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What to export, and how.
 #[derive(Debug, Args)]
@@ -46,6 +47,10 @@ pub struct ExportArgs {
         allow_hyphen_values = true
     )]
     write_count: String,
+    /// For c and rust: what the genome is called there [default: after the run or the file, and the
+    /// genome's CRC, so that several fit into one program].
+    #[arg(long, value_name = "IDENTIFIER", allow_hyphen_values = true)]
+    name: Option<String>,
     /// For bin and slot: the chip, as probe-rs names it.
     #[arg(long, value_name = "CHIP", default_value = "STM32F407VGTx")]
     chip: String,
@@ -75,6 +80,9 @@ pub enum Format {
 /// # Errors
 /// [`BadInput`] if genome or run cannot be read or the file exists.
 pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
+    if arguments.name.is_some() && !matches!(arguments.format, Format::C | Format::Rust) {
+        return Err(BadInput::new("--name goes with --format c and --format rust").into());
+    }
     let address = flag("address", &arguments.address, memory_address)?;
     // Enough counts are left that the robot can always be updated over its line.
     let write_count = flag("write-count", &arguments.write_count, |text| {
@@ -139,8 +147,14 @@ fn genome(
     let container = read_genome(&arguments.from)?;
     let encoded = EncodedGenome::decode(&container)?;
     Ok(match format {
-        Format::C => c_header(&encoded, &container).into_bytes(),
-        Format::Rust => rust_source(&encoded, &container).into_bytes(),
+        Format::C => c_header(&encoded, &container, &symbol(arguments, &container)?).into_bytes(),
+        Format::Rust => {
+            let mut symbol = symbol(arguments, &container)?;
+            if arguments.name.is_none() {
+                symbol.make_ascii_uppercase();
+            }
+            rust_source(&encoded, &container, &symbol).into_bytes()
+        }
         Format::Hex => {
             let text = intel_hex(&container, address).ok_or_else(|| {
                 BadInput::new(format!(
@@ -154,6 +168,23 @@ fn genome(
         Format::Slot => slot(&container, write_count),
         Format::Bin | Format::Trajectory => container,
     })
+}
+
+/// What a genome is called in source.
+fn symbol(arguments: &ExportArgs, container: &[u8]) -> Result<String, BadInput> {
+    if let Some(name) = &arguments.name {
+        return flag("name", name, |name| {
+            let checked = checked_identifier(name);
+            checked.map(str::to_owned).map_err(str::to_owned)
+        });
+    }
+    // A run's genome is called after the run.
+    let file = genome_file(&arguments.from);
+    let file = file.canonicalize().unwrap_or(file);
+    let stem = file.file_stem().filter(|stem| *stem != "best");
+    let name = stem.or_else(|| file.parent()?.file_name());
+    let name = terminal_path(Path::new(name.unwrap_or_default()));
+    Ok(embedding::symbol(&name, container))
 }
 
 /// An address, decimal or hexadecimal.

@@ -7,6 +7,7 @@ use crate::exit::Exit;
 use crate::files::Existing;
 use crate::replay::gallery::write;
 use crate::settings::count;
+use crate::text::terminal_path;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -46,7 +47,7 @@ pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
     };
     show_line!(
         "{} ({} runs, {:.1} MB{left_out})",
-        written.index.display(),
+        terminal_path(&written.index),
         written.runs,
         written.bytes as f64 / 1e6
     );

@@ -8,8 +8,8 @@ use crate::exit::Exit;
 use crate::finished_run::FinishedRun;
 use crate::hil::{Course, HilError, Ran};
 use crate::report::progress;
-use crate::report::summary::shell_word;
 use crate::robot::{Afterwards, Robot, RobotError, describe, is_in_use};
+use crate::text::shell_path;
 use clap::Args;
 use indicatif::ProgressBar;
 use minimal_surprise_controller::{Controller, EncodedGenome};
@@ -55,7 +55,7 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
             port.name(),
             describe(robot.identity().genome),
             genome.display(),
-            port.command(&format!("flash {}", shell_word(&genome))),
+            port.command(&format!("flash {}", shell_path(&genome))),
         ))
         .into());
     }

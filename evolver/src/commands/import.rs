@@ -6,6 +6,7 @@ use super::evaluate::flag;
 use crate::files::{self, DATA_BYTES_MAX, FileError};
 use crate::new_dir::{NewDir, remove_abandoned};
 use crate::settings::{Given, describe, resolve_topology};
+use crate::text::terminal_path;
 use clap::Args;
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
 use minimal_surprise_controller::{Prediction, Provenance, SensorModel, Template, Topology};
@@ -94,8 +95,7 @@ pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
 
 /// The generations in a file, with their numbers; if only one is wanted, no other has to be right.
 fn read(path: &Path, only: Option<u32>) -> anyhow::Result<Vec<(u32, GenomeRows)>> {
-    let bytes = files::read(path, DATA_BYTES_MAX).map_err(unusable)?;
-    let text = String::from_utf8_lossy(&bytes);
+    let text = files::read_text(path, DATA_BYTES_MAX).map_err(unusable)?;
     let about = |error: ExchangeError| BadInput::new(format!("{}, {error}", path.display()));
     let (mut found, mut count) = (Vec::new(), 0);
     for (generation, rows) in (0..).zip(generations(&text)) {
@@ -176,7 +176,7 @@ fn report(topology: Topology, directory: &Path, imported: &[(u32, ImportedGenome
         let path = directory.join(name(*generation));
         text += &format!(
             "{}: largest rounding {:.2e}, {} weights that did not fit\n",
-            path.display(),
+            terminal_path(&path),
             imported.rounding_error_max,
             imported.saturated.len()
         );

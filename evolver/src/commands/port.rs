@@ -3,10 +3,11 @@
 use super::evaluate::flag;
 use super::{BadInput, Interrupted};
 use crate::exit::Exit;
-use crate::report::summary::{program, shell_word};
+use crate::report::summary::program;
 use crate::robot::{PortName, Problem, Robot, RobotError, standing};
 use crate::settings::count;
 use crate::signals::{ask_to_stop, on_signal, stop};
+use crate::text::shell_path;
 use clap::Args;
 use std::path::Path;
 use std::time::Duration;
@@ -65,7 +66,7 @@ impl PortArgs {
 
     /// The line that runs another command on the same port.
     pub(super) fn command(&self, command: &str) -> String {
-        let port = shell_word(Path::new(&self.port));
+        let port = shell_path(Path::new(&self.port));
         let line = format!("{} {command} --port {port}", program());
         match self.baud.as_str() {
             BAUD => line,

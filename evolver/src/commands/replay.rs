@@ -14,6 +14,7 @@ use crate::replay::recording::{Origin, Recording};
 use crate::replay::scene::Colouring;
 use crate::replay::terminal::{self, PlayError};
 use crate::signals::{ask_to_stop, on_signal, stop};
+use crate::text::{self, TextError, terminal_path};
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::damage::Damage;
@@ -92,7 +93,7 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
         let page = page(&recording, arguments.colour, None)
             .map_err(|error| BadInput::new(format!("{}: {error}", arguments.run.display())))?;
         write_file("html", file, page.as_bytes(), existing)?;
-        show_line!("{} ({} KB)", file.display(), page.len().div_ceil(1000));
+        show_line!("{} ({} KB)", terminal_path(file), page.len().div_ceil(1000));
     }
     if arguments.pictures.is_any() {
         arguments
@@ -156,7 +157,7 @@ pub(super) fn write_file(
 
 fn recording(arguments: &ReplayArgs) -> anyhow::Result<Recording> {
     let path = &arguments.run;
-    let name = path.display().to_string();
+    let name = terminal_path(path);
     let conditions = &arguments.conditions;
     if path.is_dir() {
         conditions.refuse_beside("a run directory", path)?;
@@ -175,13 +176,14 @@ fn recording(arguments: &ReplayArgs) -> anyhow::Result<Recording> {
         }
     }
     let bytes = files::read(path, DATA_BYTES_MAX).map_err(unusable)?;
-    match std::str::from_utf8(&bytes) {
-        Ok(text) if text.trim_start_matches('\u{feff}').starts_with("Gen:") => {
+    match text::decode(&bytes) {
+        Ok(text) if text.starts_with("Gen:") => {
             conditions.refuse_beside("a trajectory", path)?;
-            let trajectory = Trajectory::read(text)
+            let trajectory = Trajectory::read(&text)
                 .map_err(|error| BadInput::new(format!("{name}, {error}")))?;
             Ok(Recording::of_trajectory(&name, &trajectory).map_err(BadInput::new)?)
         }
+        Err(error @ TextError::Utf16) => Err(BadInput::new(format!("{name}: {error}")).into()),
         _ => of_genome(arguments, path, &name),
     }
 }

@@ -5,13 +5,12 @@ use super::evaluate::flag;
 use super::{BadInput, thread_pool};
 use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
-use crate::files::{self, Existing};
-use crate::new_dir::remove_abandoned;
+use crate::files::{self, Existing, TEXT_BYTES_MAX};
 use crate::limits::{self, Needs};
+use crate::new_dir::remove_abandoned;
 use crate::replay::gallery;
 use crate::report::progress::ProgressMode;
 use crate::report::suite_progress::{SearchProgress, SuiteProgress, robot_steps};
-use crate::report::summary::shell_word;
 use crate::run_dir::{Found, RunDir, RunDirError};
 use crate::settings::count;
 use crate::signals::stop_on_signal;
@@ -20,12 +19,16 @@ use crate::suite::report;
 use crate::suite::search::{Search, look};
 use crate::suite::work::{Progress, Shard, Waiting, Worked, progress, work_on};
 use crate::suite::{PAPER, Resilience, Suite, slurm};
+use crate::text::{file_name_except, shell_path, shell_word, terminal_path};
 use clap::{Args, Subcommand, ValueEnum};
 use minimal_surprise_sim::Path as CodePath;
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Name of the directory of the paper's suite.
+const BUILT_IN: &str = "paper";
 
 /// A suite of one's own.
 #[derive(Debug, Args)]
@@ -94,7 +97,7 @@ pub enum Verb {
 #[derive(Debug, Args)]
 pub struct Choice {
     /// Only this experiment.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     only: Option<String>,
     /// Runs of every combination, instead of the suite's number.
     #[arg(
@@ -110,7 +113,7 @@ pub struct Choice {
     /// Also what goes beyond the paper.
     #[arg(long)]
     all: bool,
-    /// Directory of the suite [default: runs/ and the suite's name].
+    /// Directory of the suite [default: runs/ and the suite's name as a file name].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -209,10 +212,9 @@ pub fn run_task(arguments: &TaskArgs) -> anyhow::Result<Exit> {
 }
 
 fn read(file: &Path) -> Result<Read, BadInput> {
-    let text = fs::read_to_string(file)
-        .map_err(|error| BadInput::new(format!("{}: {error}", file.display())))?;
+    let text = files::read_text(file, TEXT_BYTES_MAX).map_err(BadInput::new)?;
     let suite = Suite::parse(file, &text).map_err(BadInput::new)?;
-    let called = format!("evolver suite {}", shell_word(file));
+    let called = format!("evolver suite {}", shell_path(file));
     Ok(Read {
         suite,
         text,
@@ -270,7 +272,7 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
                 "{} of {} runs; {}",
                 written.finished,
                 written.planned,
-                written.html.display()
+                terminal_path(&written.html)
             );
             return Ok(name_damaged(&damaged, Some(&again)));
         }
@@ -335,7 +337,7 @@ fn write_gallery(finished: &[PathBuf], out: &Path) -> anyhow::Result<DamagedRuns
         "{} runs, {:.1} MB; {}",
         written.runs,
         written.bytes as f64 / 1e6,
-        written.index.display()
+        terminal_path(&written.index)
     );
     Ok(written.damaged)
 }
@@ -385,8 +387,16 @@ fn plan(suite: &Suite, choice: &Choice) -> Result<Plan, BadInput> {
 }
 
 fn directory(suite: &Suite, choice: &Choice) -> PathBuf {
-    let named = || Path::new("runs").join(&suite.name);
-    choice.out.clone().unwrap_or_else(named)
+    choice.out.clone().unwrap_or_else(|| {
+        let runs = Path::new("runs");
+        let taken = if suite.built_in { "" } else { BUILT_IN };
+        // What an earlier version called so is continued.
+        let mut there = fs::read_dir(runs).into_iter().flatten().flatten();
+        if suite.name != taken && there.any(|entry| entry.file_name() == *suite.name) {
+            return runs.join(&suite.name);
+        }
+        runs.join(file_name_except(&suite.name, taken))
+    })
 }
 
 fn print_plan(plan: &Plan, suite: &Suite, searches: &[Resilience]) {
@@ -513,8 +523,8 @@ fn searches<'a>(suite: &'a Suite, choice: &Choice) -> &'a [Resilience] {
 fn command(read: &Read, choice: &Choice, directory: &Path) -> String {
     let mut words = vec![read.called.clone(), "run".to_owned()];
     let flags = flags(choice);
-    words.extend(flags.iter().map(|flag| shell_word(Path::new(flag))));
-    words.extend(["--out".to_owned(), shell_word(directory)]);
+    words.extend(flags.iter().map(|flag| shell_word(flag)));
+    words.extend(["--out".to_owned(), shell_path(directory)]);
     words.join(" ")
 }
 
@@ -658,7 +668,7 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
         show_line!(
             "{done} of {} runs done in {}",
             runs.number(),
-            directory.display()
+            terminal_path(directory)
         );
         if let Some(hash) = hash {
             show_line!("hash {hash}");

@@ -2,6 +2,7 @@
 
 use crate::robot::length_and_crc;
 use crate::settings::describe;
+use crate::text::{identifier, shell_path, shell_word};
 use ihex::{Record, create_object_file_representation};
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_slots::Header;
@@ -10,15 +11,25 @@ use std::path::Path;
 /// Bytes a line, in source text and Intel HEX.
 const LINE_BYTES: usize = 16;
 
-/// A C header with the container.
+/// What a genome is called in source: after a file or a run, and after its bytes, so that several can
+/// be in one program.
 #[must_use]
-pub fn c_header(genome: &EncodedGenome<'_>, container: &[u8]) -> String {
+pub fn symbol(name: &str, container: &[u8]) -> String {
+    let crc = length_and_crc(container).map_or(0, |(_, crc)| crc);
+    format!("minimal_surprise_genome_{}_{crc:08x}", identifier(name)).replace("__", "_")
+}
+
+/// A C header with the container as an array of this name.
+#[must_use]
+pub fn c_header(genome: &EncodedGenome<'_>, container: &[u8], symbol: &str) -> String {
+    // As it is: names that differ in case only are two.
+    let guard = format!("{symbol}_INCLUDED");
     format!(
         "/* A minimal-surprise genome: {}. */\n\
-         #ifndef MINIMAL_SURPRISE_GENOME_H\n\
-         #define MINIMAL_SURPRISE_GENOME_H\n\n\
+         #ifndef {guard}\n\
+         #define {guard}\n\n\
          #include <stdint.h>\n\n\
-         static const uint8_t minimal_surprise_genome[{}] = {{\n{}}};\n\n\
+         static const uint8_t {symbol}[{}] = {{\n{}}};\n\n\
          #endif\n",
         describe(genome.topology()),
         container.len(),
@@ -26,12 +37,12 @@ pub fn c_header(genome: &EncodedGenome<'_>, container: &[u8]) -> String {
     )
 }
 
-/// Rust source with the container.
+/// Rust source with the container as a static of this name.
 #[must_use]
-pub fn rust_source(genome: &EncodedGenome<'_>, container: &[u8]) -> String {
+pub fn rust_source(genome: &EncodedGenome<'_>, container: &[u8], symbol: &str) -> String {
     format!(
         "/// A minimal-surprise genome: {}.\n\
-         pub static GENOME: [u8; {}] = [\n{}];\n",
+         pub static {symbol}: [u8; {}] = [\n{}];\n",
         describe(genome.topology()),
         container.len(),
         hex_lines(container)
@@ -99,24 +110,9 @@ pub fn slot(container: &[u8], write_count: u32) -> Vec<u8> {
 pub fn probe_rs_line(file: &Path, chip: &str, address: u32) -> String {
     format!(
         "probe-rs download --chip {} --binary-format bin --base-address {address:#010x} {}",
-        quoted(chip),
-        quoted(&file.to_string_lossy())
+        shell_word(chip),
+        shell_path(file)
     )
-}
-
-/// As a shell takes it for one word.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./+:,=@".contains(c);
-    // What starts with a dash would be an option.
-    let word = match word.strip_prefix('-') {
-        Some(_) => format!("./{word}"),
-        None => word.to_owned(),
-    };
-    if !word.is_empty() && word.chars().all(plain) {
-        word
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use super::structures::{self, Classified};
 use crate::experiment::{Experiment, Finding};
 use crate::output::stdout_is_ascii;
 use crate::settings::{describe, model_name};
+use crate::text::shell_path;
 use console::{Style, Term};
 use minimal_surprise_controller::codec::FORMAT_VERSION;
 use minimal_surprise_controller::network::Shape;
@@ -23,18 +24,6 @@ pub fn program() -> &'static str {
         "cargo run --release --"
     } else {
         "evolver"
-    }
-}
-
-/// A path as a word that can be copied into a shell.
-#[must_use]
-pub fn shell_word(path: &Path) -> String {
-    let text = path.to_string_lossy();
-    let plain = |c: char| c.is_alphanumeric() || "/._-+=".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        text.into_owned()
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
     }
 }
 
@@ -74,7 +63,9 @@ pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> 
         measures: Some(&finding.measures),
     };
     let program = program();
-    let directory = shell_word(directory);
+    let at = |file: &str| shell_path(&directory.join(file));
+    let (genome, config) = (at("best.genome"), at("config.toml"));
+    let directory = shell_path(directory);
     format!(
         "{picture}\n\n\
          structure     {structure}: {share:.0} % of the robots ({members})\n\
@@ -86,9 +77,9 @@ pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> 
          watch it               {program} replay {directory}\n  \
          measure the run        {program} classify {directory}\n  \
          from other starts      {program} evaluate {directory}\n  \
-         look into the genome   {program} inspect {directory}/best.genome\n  \
-         evolve it further      {program} evolve --from {directory}/best.genome\n  \
-         the same run again     {program} evolve {directory}/config.toml\n",
+         look into the genome   {program} inspect {genome}\n  \
+         evolve it further      {program} evolve --from {genome}\n  \
+         the same run again     {program} evolve {config}\n",
         members = if stdout_is_ascii() {
             "starred"
         } else {

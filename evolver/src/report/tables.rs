@@ -3,6 +3,7 @@
 use super::structures;
 use crate::experiment::{Experiment, Finding};
 use crate::settings::{Settings, seed_text};
+use crate::text::shell_word;
 use minimal_surprise_controller::KERNEL_ID;
 use minimal_surprise_sim::Pose;
 use serde::Serialize;
@@ -29,7 +30,8 @@ struct Meta<'a> {
 /// `meta.json`: how the run was made.
 #[must_use]
 pub fn meta(settings: &Settings) -> String {
-    let arguments = std::env::args_os().map(|argument| argument.to_string_lossy().into_owned());
+    let arguments =
+        std::env::args_os().map(|argument| argument.into_string().unwrap_or_else(shell_word));
     pretty(&Meta {
         schema_version: SCHEMA_VERSION,
         seed: settings.seed,

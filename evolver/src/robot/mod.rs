@@ -11,6 +11,7 @@ pub use error::{Doing, Heard, OtherReader, Problem, RobotError};
 pub use held::{Afterwards, standing};
 pub use line::PortName;
 
+use crate::text::terminal;
 use line::{Line, is_lost_session};
 use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Surprise};
 use minimal_surprise_link::{
@@ -329,9 +330,7 @@ fn identify(line: &mut Line) -> Result<Identity, RobotError> {
     identity.map_err(|what| line.about(Problem::Impossible { what }))
 }
 
-/// Name and version without what a terminal would take for commands.
+/// Name and version, with nothing that a terminal would take for commands.
 fn printable(firmware: &str, version: &str) -> String {
-    let mut text = format!("{firmware} {version}");
-    text.retain(|character| !character.is_control());
-    text
+    terminal(&format!("{firmware} {version}"))
 }

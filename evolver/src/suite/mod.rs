@@ -20,6 +20,8 @@ pub mod search;
 pub mod slurm;
 pub mod work;
 
+use crate::files::{self, FileError, TEXT_BYTES_MAX};
+use crate::text::{self, is_hidden};
 use minimal_surprise_sim::Structure;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -33,6 +35,9 @@ pub const PAPER: &str = include_str!("paper.toml");
 pub struct Suite {
     /// Its name.
     pub name: String,
+    /// Whether it is the paper's, which is built in: its numbers are compared with the paper's.
+    #[serde(skip)]
+    pub built_in: bool,
     /// Its evolutions.
     #[serde(default, rename = "experiment")]
     pub experiments: Vec<Experiment>,
@@ -155,6 +160,20 @@ fn check_count(key: &str, value: u32) -> Result<(), String> {
     ))
 }
 
+/// A name is shown, typed, and made into names of files; `...` and blanks say nothing.
+fn check_name(name: &str) -> Result<(), String> {
+    if let Some(hidden) = name.chars().find(|&c| is_hidden(c)) {
+        return Err(format!(
+            "name = {name:?}: expected visible characters, not {}",
+            text::terminal(&hidden.to_string())
+        ));
+    }
+    if name.chars().all(|c| c == '.' || c.is_whitespace()) {
+        return Err(format!("name = {name:?}: expected a name"));
+    }
+    Ok(())
+}
+
 fn check_list<T>(key: &str, list: &[T]) -> Result<(), String> {
     if list.is_empty() {
         return Err(format!("{key} = []: expected at least one"));
@@ -210,6 +229,7 @@ impl Experiment {
     }
 
     fn check(&self, combinations: &mut u64) -> Result<(), String> {
+        check_name(&self.name)?;
         check_count("runs", self.runs)?;
         check_list("grids", &self.grids)?;
         check_list("robots", &self.robots)?;
@@ -225,6 +245,7 @@ impl Experiment {
 
 impl Reevaluation {
     fn check(&self, names: &[&str]) -> Result<(), String> {
+        check_name(&self.name)?;
         check_list("of", &self.of)?;
         self.of.iter().try_for_each(|of| check_of(of, names))?;
         check_count("starts", self.starts)
@@ -235,13 +256,8 @@ impl Reevaluation {
 #[derive(Debug, thiserror::Error)]
 pub enum SuiteError {
     /// The file cannot be read.
-    #[error("{}: {error}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        error: std::io::Error,
-    },
+    #[error(transparent)]
+    Unreadable(#[from] FileError),
     /// It is not a suite; the message has the place.
     #[error("{}: {error}", path.display())]
     Toml {
@@ -255,6 +271,14 @@ pub enum SuiteError {
     NoExperiment {
         /// The file.
         path: PathBuf,
+    },
+    /// The suite's name is not valid.
+    #[error("{}: {problem}", path.display())]
+    Name {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what would be valid.
+        problem: String,
     },
     /// A value is not valid.
     #[error("{}: experiment {experiment:?}: {problem}", path.display())]
@@ -277,6 +301,7 @@ impl Resilience {
     }
 
     fn check(&self, experiments: &[Experiment]) -> Result<(), String> {
+        check_name(&self.name)?;
         let names: Vec<&str> = experiments.iter().map(|e| e.name.as_str()).collect();
         check_of(&self.of, &names)?;
         if self.structure().is_none() {
@@ -318,7 +343,11 @@ impl Suite {
     /// # Errors
     /// None: a test holds it to be well-formed.
     pub fn paper() -> Result<Self, SuiteError> {
-        Self::parse(Path::new("paper.toml"), PAPER)
+        let suite = Self::parse(Path::new("paper.toml"), PAPER)?;
+        Ok(Self {
+            built_in: true,
+            ..suite
+        })
     }
 
     /// Reads a suite.
@@ -326,11 +355,7 @@ impl Suite {
     /// # Errors
     /// [`SuiteError`] names the file and the place in it.
     pub fn read(path: &Path) -> Result<Self, SuiteError> {
-        let text = std::fs::read_to_string(path).map_err(|error| SuiteError::Unreadable {
-            path: path.to_owned(),
-            error,
-        })?;
-        Self::parse(path, &text)
+        Self::parse(path, &files::read_text(path, TEXT_BYTES_MAX)?)
     }
 
     /// Reads a suite's text; the path is for errors.
@@ -347,6 +372,10 @@ impl Suite {
             experiment: experiment.to_owned(),
             problem,
         };
+        check_name(&suite.name).map_err(|problem| SuiteError::Name {
+            path: path.to_owned(),
+            problem,
+        })?;
         let names: Vec<&str> = suite.experiments.iter().map(|e| e.name.as_str()).collect();
         if names.is_empty() {
             return Err(SuiteError::NoExperiment {

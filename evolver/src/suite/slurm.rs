@@ -6,6 +6,7 @@
 //! done by its files.
 
 use crate::files::{self, FileError};
+use crate::text::{shell_path, shell_word};
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -89,13 +90,12 @@ impl Job<'_> {
     }
 
     fn script_in(&self, folder: &Path) -> String {
-        let word = |path: &Path| quoted(&path.to_string_lossy());
         let plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
         let at_once = self.at_once.map_or(String::new(), |n| format!("%{n}"));
         let flags: String = self
             .flags
             .iter()
-            .map(|flag| format!(" {}", quoted(flag)))
+            .map(|flag| format!(" {}", shell_word(flag)))
             .collect();
         format!(
             "#!/bin/sh\n\
@@ -109,9 +109,9 @@ impl Job<'_> {
              --suite {suite} --out {directory} --threads 1 --progress lines{flags}\n",
             name = self.name.replace(|c| !plain(c), "-"),
             last = self.shards - 1,
-            program = word(&folder.join(PROGRAM)),
-            suite = word(&folder.join(SUITE_FILE)),
-            directory = word(self.directory),
+            program = shell_path(&folder.join(PROGRAM)),
+            suite = shell_path(&folder.join(SUITE_FILE)),
+            directory = shell_path(self.directory),
             shards = self.shards,
         )
     }
@@ -178,11 +178,6 @@ fn array_max() -> Option<u32> {
     line?.split('=').nth(1)?.trim().parse().ok()
 }
 
-/// A word for the shell.
-fn quoted(word: &str) -> String {
-    format!("'{}'", word.replace('\'', "'\\''"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -210,6 +205,6 @@ mod tests {
             script.contains("--shard \"$SLURM_ARRAY_TASK_ID/8\""),
             "{script}"
         );
-        assert!(script.ends_with("'--runs' '2'\n"), "{script}");
+        assert!(script.ends_with("--runs 2\n"), "{script}");
     }
 }

@@ -13,6 +13,7 @@ use crate::files::{self, Existing, FileError};
 use crate::finished_run::{FinishedRun, ReadRunError};
 use crate::new_dir::{NewDir, remove_abandoned};
 use crate::settings::model_name;
+use crate::text::{new_file_name, terminal_path};
 use minimal_surprise_sim::Structure;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -140,7 +141,9 @@ struct Found {
 impl Found {
     fn in_all(directories: &[PathBuf]) -> Result<Self, GalleryError> {
         let mut found = Self::default();
-        found.names.insert(INDEX.to_owned());
+        found
+            .names
+            .insert(INDEX.trim_end_matches(".html").to_owned());
         for directory in directories {
             if holds_run(directory)?.is_some() {
                 found.add(directory)?;
@@ -183,9 +186,8 @@ impl Found {
     fn add(&mut self, run: &Path) -> Result<(), FileError> {
         let whole = run.canonicalize().map_err(FileError::at(run))?;
         if self.seen.insert(whole.clone()) {
-            let name = whole.file_name().unwrap_or_default().to_string_lossy();
-            let name = page_name(&name, &self.names);
-            self.names.insert(name.clone());
+            let name = terminal_path(Path::new(whole.file_name().unwrap_or_default()));
+            let name = format!("{}.html", new_file_name(&name, &mut self.names));
             self.runs.push((run.to_owned(), name));
         }
         Ok(())
@@ -265,24 +267,9 @@ fn causes(damaged: &DamagedRuns) -> String {
     causes.join("\n")
 }
 
-/// A name of a file that no link has to escape, different from those that are taken.
-fn page_name(run: &str, taken: &BTreeSet<String>) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    let stem: String = run
-        .chars()
-        .map(|c| if plain(c) { c } else { '-' })
-        .collect();
-    let numbered = |number: u32| match number {
-        1 => format!("{stem}.html"),
-        _ => format!("{stem}-{number}.html"),
-    };
-    let free = (1..).map(numbered).find(|name| !taken.contains(name));
-    free.unwrap_or_default()
-}
-
 fn read(run: &Path) -> Result<Recording, GalleryError> {
     let finished = FinishedRun::read_and_check(run)?;
-    let name = run.display().to_string();
+    let name = terminal_path(run);
     Recording::of_run(&name, &finished).map_err(|error| GalleryError::World {
         path: run.to_owned(),
         error,

@@ -1,6 +1,7 @@
 //! What the pages have in common: one document with everything in it.
 
 use crate::replay::palette::{DARK, LIGHT, Theme};
+use crate::text;
 use minimal_surprise_controller::Turn;
 use serde_json::Value;
 use std::fmt::Write;
@@ -55,7 +56,7 @@ impl Document<'_> {
              <script type=\"application/json\" id=\"about\">{about}</script>\n\
              <script type=\"text/plain\" id=\"data\">{data}</script>\n\
              <script>\n'use strict';\n{common_script}{script}</script>\n</body>\n</html>\n",
-            title = escape(title),
+            title = text::html(title),
             common_style = include_str!("common.css"),
             common_script = include_str!("common.js"),
         )
@@ -81,12 +82,4 @@ fn variables(theme: &Theme) -> String {
         }
     }
     text
-}
-
-/// Text that is only text in HTML.
-#[must_use]
-pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
 }

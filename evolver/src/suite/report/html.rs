@@ -4,6 +4,8 @@ use super::findings::Verdict;
 use super::markdown::{interval, ours, sentence, theirs, verdict};
 use super::tables::{Table, Value};
 use super::{Report, p_value, plural};
+use crate::text::{html as escape, markdown, markdown_code};
+use pulldown_cmark::{Event, Parser, html::push_html};
 use std::fmt::Write;
 
 const STYLE: &str = "
@@ -55,11 +57,11 @@ pub fn page(report: &Report) -> String {
     if report.has_gallery {
         page += "<p><a href=\"gallery/index.html\">Look at every run</a>: its final state and its replay.</p>\n";
     } else {
-        let _ = writeln!(page, "<p>{}</p>", marked_up(&to_look_at(report)));
+        page += &rendered(&to_look_at(report));
     }
     for (heading, paragraphs) in opening(report) {
         let _ = writeln!(page, "<h2>{}</h2>", escape(heading));
-        write_paragraphs(&mut page, &paragraphs);
+        page += &rendered(&paragraphs.join("\n"));
     }
     write_findings(&mut page, report);
     let ours = "Ours in bold, below it the 95 % interval";
@@ -87,8 +89,8 @@ pub fn page(report: &Report) -> String {
 /// How every run can be looked at, where there is no gallery.
 pub(super) fn to_look_at(report: &Report) -> String {
     format!(
-        "A gallery of every run, its final state and its replay, is made by `{} report --gallery`.",
-        report.called
+        "A gallery of every run, its final state and its replay, is made by {}.",
+        markdown_code(&format!("{} report --gallery", report.called))
     )
 }
 
@@ -115,9 +117,13 @@ pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
     if report.tests > 0 || !report.findings.is_empty() {
         let mut lines = Vec::new();
         for finding in report.different_findings() {
-            let mut line = format!("- {}: *differs*: {}", finding.claim, finding.ours);
+            let mut line = format!(
+                "- {}: *differs*: {}",
+                markdown(&finding.claim),
+                markdown(&finding.ours)
+            );
             if !finding.detail.is_empty() {
-                let _ = write!(line, ". {}.", finding.detail);
+                let _ = write!(line, ". {}.", markdown(&finding.detail));
             }
             lines.push(line);
         }
@@ -163,45 +169,22 @@ pub(super) fn heading(table: &Table) -> String {
     }
 }
 
-/// Paragraphs, and lists where lines begin with a dash.
-fn write_paragraphs(page: &mut String, lines: &[String]) {
-    let mut in_list = false;
-    for line in lines
-        .iter()
-        .map(|line| line.trim())
-        .filter(|line| !line.is_empty())
-    {
-        match line.strip_prefix("- ") {
-            Some(item) => {
-                if !in_list {
-                    page.push_str("<ul>\n");
-                }
-                in_list = true;
-                let _ = writeln!(page, "<li>{}</li>", marked_up(item));
-            }
-            None => {
-                if in_list {
-                    page.push_str("</ul>\n");
-                }
-                in_list = false;
-                let _ = writeln!(page, "<p>{}</p>", marked_up(line));
-            }
-        }
-    }
-    if in_list {
-        page.push_str("</ul>\n");
-    }
+/// Markdown as HTML; HTML in it is text.
+fn rendered(markdown: &str) -> String {
+    let mut page = String::new();
+    let events = Parser::new(markdown).map(|event| match event {
+        Event::Html(text) | Event::InlineHtml(text) => Event::Text(text),
+        event => event,
+    });
+    push_html(&mut page, events);
+    page
 }
 
 fn write_findings(page: &mut String, report: &Report) {
     if report.findings.is_empty() {
         return;
     }
-    let _ = writeln!(
-        page,
-        "<h2>Main findings</h2>\n<p>{}</p>",
-        marked_up(VERDICTS)
-    );
+    let _ = writeln!(page, "<h2>Main findings</h2>\n{}", rendered(VERDICTS));
     page.push_str(
         "<div class=\"wide\"><table><thead><tr><th>the paper's finding</th>\
          <th>ours</th><th>test</th><th>verdict</th></tr></thead><tbody>\n",
@@ -321,40 +304,16 @@ fn write_making(page: &mut String, report: &Report) {
     page.push_str("<p>Every run with its seed and hash: <a href=\"runs.csv\">runs.csv</a>.</p>\n");
 }
 
-/// Text with what is between backticks as code and what is between single stars stressed.
-fn marked_up(text: &str) -> String {
-    let mut marked = String::new();
-    for (place, part) in escape(text).split('`').enumerate() {
-        if place % 2 == 1 {
-            let _ = write!(marked, "<code>{part}</code>");
-            continue;
-        }
-        for (place, part) in part.split('*').enumerate() {
-            match place % 2 {
-                1 => drop(write!(marked, "<em>{part}</em>")),
-                _ => marked.push_str(part),
-            }
-        }
-    }
-    marked
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn backticks_are_code_and_stars_stress() {
+    fn backticks_are_code_stars_stress_and_html_is_text() {
         assert_eq!(
-            marked_up("a < b: *differs*, see `run *` and `x`"),
-            "a &lt; b: <em>differs</em>, see <code>run *</code> and <code>x</code>"
+            rendered("a < b: *differs*, see `run *` and\n<i>`x`\n\n- one\n- \\*two"),
+            "<p>a &lt; b: <em>differs</em>, see <code>run *</code> and\n&lt;i&gt;<code>x</code></p>\n\
+             <ul>\n<li>one</li>\n<li>*two</li>\n</ul>\n"
         );
     }
 }

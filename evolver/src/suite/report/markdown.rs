@@ -2,12 +2,13 @@
 
 use super::tables::{Table, Value};
 use super::{Report, number, p_value};
+use crate::text::{markdown, markdown_code_cell};
 use std::fmt::Write;
 
 /// The whole report.
 #[must_use]
 pub fn text(report: &Report) -> String {
-    let mut text = format!("# Report of the suite {}\n", report.suite);
+    let mut text = format!("# Report of the suite {}\n", markdown(&report.suite));
     for (heading, paragraphs) in super::html::opening(report) {
         let _ = write!(text, "\n## {heading}\n\n");
         for paragraph in paragraphs {
@@ -21,9 +22,9 @@ pub fn text(report: &Report) -> String {
             let _ = writeln!(
                 text,
                 "| {} | {} | {} | {} | *{}* |",
-                finding.claim,
-                finding.ours,
-                finding.test,
+                markdown(&finding.claim),
+                markdown(&finding.ours),
+                markdown(&finding.test),
                 finding.p.map_or("–".to_owned(), p_value),
                 finding.verdict.name()
             );
@@ -39,9 +40,9 @@ pub fn text(report: &Report) -> String {
         let _ = write!(
             text,
             "\n![{}]({}.svg)\n\n{} Data: [{}.csv]({}.csv).\n",
-            figure.title,
+            markdown(&figure.title),
             figure.id,
-            sentence(&figure.title),
+            markdown(&sentence(&figure.title)),
             figure.id,
             figure.id
         );
@@ -50,15 +51,15 @@ pub fn text(report: &Report) -> String {
     for making in &report.making {
         let _ = writeln!(
             text,
-            "| {} | {} | {} of {} | {} | {} | `{}` | {} | `{}` |",
-            making.experiment,
-            making.setting,
+            "| {} | {} | {} of {} | {} | {} | {} | {} | `{}` |",
+            markdown(&making.experiment),
+            markdown(&making.setting),
             making.finished,
             making.planned,
             making.seeds,
             making.minutes(),
-            making.command,
-            making.programs,
+            markdown_code_cell(&making.command),
+            markdown(&making.programs),
             making.hash
         );
     }
@@ -83,13 +84,17 @@ pub(super) fn sentence(words: &str) -> String {
 }
 
 fn write_table(text: &mut String, table: &Table) {
-    let _ = write!(text, "\n### {}\n\n| |", super::html::heading(table));
+    let _ = write!(
+        text,
+        "\n### {}\n\n| |",
+        markdown(&super::html::heading(table))
+    );
     for column in &table.columns {
-        let _ = write!(text, " {column} |");
+        let _ = write!(text, " {} |", markdown(column));
     }
     let _ = writeln!(text, "\n|---|{}", "---|".repeat(table.columns.len()));
     for row in &table.rows {
-        let _ = write!(text, "| {} |", name(&row.name, &row.counted));
+        let _ = write!(text, "| {} |", markdown(&name(&row.name, &row.counted)));
         for value in &row.values {
             let _ = write!(text, " {} |", value.as_ref().map_or(String::new(), cell));
         }
@@ -97,7 +102,7 @@ fn write_table(text: &mut String, table: &Table) {
     }
     text.push('\n');
     for note in &table.notes {
-        let _ = writeln!(text, "- {note}");
+        let _ = writeln!(text, "- {}", markdown(note));
     }
     let _ = writeln!(text, "- Data: [{}.csv]({}.csv).", table.id, table.id);
 }

@@ -21,6 +21,7 @@ use crate::damaged_runs::DamagedRuns;
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::replay::gallery;
 use crate::report::progress::seconds;
+use crate::text::{markdown, new_file_name, shell_word};
 use crate::time_spent::TimeSpent;
 use figures::{Figure, FigureError};
 use findings::{Finding, Verdict};
@@ -34,6 +35,9 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tables::{Table, Value};
+
+/// Names of a report's other files, without their ends.
+const OTHER_FILES: [&str; 4] = ["report", "runs", "findings", "how-made"];
 
 /// What people found out about differences, in the report's folder.
 const LOOKED_INTO: &str = "looked-into.md";
@@ -215,12 +219,11 @@ pub fn write(
     called: &str,
 ) -> Result<Written, ReportError> {
     let gathered = Gathered::read(plan, suite, directory)?;
-    let mut report = Report::of(&gathered, &suite.name, called)?;
+    let mut report = Report::of(&gathered, suite, called)?;
     report.has_gallery = files::exists(&out.join(GALLERY).join(gallery::INDEX))?;
     let looked_into = out.join(LOOKED_INTO);
     if files::exists(&looked_into)? {
-        let text = files::read(&looked_into, TEXT_BYTES_MAX)?;
-        let text = String::from_utf8_lossy(&text);
+        let text = files::read_text(&looked_into, TEXT_BYTES_MAX)?;
         report.looked_into = text.lines().map(str::to_owned).collect();
     }
     let mut files = vec![
@@ -264,14 +267,23 @@ impl Report {
     ///
     /// # Errors
     /// [`ReportError`] if a figure cannot be drawn.
-    pub fn of(gathered: &Gathered, suite: &str, called: &str) -> Result<Self, ReportError> {
-        let paper = PaperValues::for_suite(suite);
-        let tables = tables::all(gathered, &paper);
+    pub fn of(gathered: &Gathered, suite: &Suite, called: &str) -> Result<Self, ReportError> {
+        let paper = PaperValues::for_suite(suite.built_in);
+        let mut tables = tables::all(gathered, &paper);
+        let mut figures = figures::all(gathered, &paper)?;
+        let mut taken = OTHER_FILES.map(str::to_owned).into();
+        let table_ids = tables.iter_mut().map(|table| &mut table.id);
+        for id in table_ids.chain(figures.iter_mut().map(|figure| &mut figure.id)) {
+            *id = new_file_name(id, &mut taken);
+        }
         let missing = gathered
             .groups
             .iter()
             .filter(|group| !group.is_complete())
-            .map(|group| format!("{}, {}: {}", group.experiment, group.label, group.counted()));
+            .map(|group| {
+                let place = format!("{}, {}", group.experiment, group.label);
+                format!("{}: {}", markdown(&place), group.counted())
+            });
         let mut seen = BTreeSet::new();
         let (mut shares_runs, mut time) = (false, TimeSpent::default());
         let groups = gathered.groups.iter().chain(&gathered.further);
@@ -284,7 +296,7 @@ impl Report {
         }
         let tests = tests(&tables);
         Ok(Self {
-            suite: suite.to_owned(),
+            suite: suite.name.clone(),
             looked_into: Vec::new(),
             has_gallery: false,
             shares_runs,
@@ -300,7 +312,7 @@ impl Report {
             tests: tests.len(),
             has_paper: tables.iter().any(has_paper),
             called: called.to_owned(),
-            figures: figures::all(gathered, &paper)?,
+            figures,
             making: groups
                 .map(|group| making(group, called))
                 .chain(made_again(gathered, called))
@@ -361,8 +373,9 @@ fn differences(tests: &[(&Table, &Value)]) -> Vec<String> {
             _ => String::new(),
         };
         format!(
-            "{source}, {}, {}{numbers} ({}, {})",
-            value.setting,
+            "{}, {}, {}{numbers} ({}, {})",
+            markdown(source),
+            markdown(&value.setting),
             value.what,
             value.test.unwrap_or_default(),
             p_value(value.p.unwrap_or(1.0))
@@ -414,7 +427,7 @@ fn making(group: &Group, called: &str) -> Making {
         } else {
             hex(hash)
         },
-        command: format!("{called} run --only {}", group.experiment),
+        command: format!("{called} run --only {}", shell_word(&group.experiment)),
         cpu_s: time.cpu_s,
         wall_s: time.wall_s,
     }
