@@ -523,7 +523,7 @@ fn searches<'a>(suite: &'a Suite, choice: &Choice) -> &'a [Resilience] {
 fn command(read: &Read, choice: &Choice, directory: &Path) -> String {
     let mut words = vec![read.called.clone(), "run".to_owned()];
     let flags = flags(choice);
-    words.extend(flags.iter().map(|flag| shell_word(flag)));
+    words.extend(flags.iter().map(shell_word));
     words.extend(["--out".to_owned(), shell_path(directory)]);
     words.join(" ")
 }
