@@ -1,6 +1,7 @@
 //! Reading a complete run directory back: the genome, where it started from, where it ended.
 
-use crate::files::{self, DATA_BYTES_MAX, FileError, TEXT_BYTES_MAX};
+use crate::files::{self, FileError, TEXT_BYTES_MAX};
+use crate::limits::{self, FINAL_STATE_BYTES_MAX};
 use crate::ranges;
 use crate::settings::{Given, SettingError, Settings};
 use crate::steps_hash::{RecordedHash, StepsHash, Version};
@@ -316,8 +317,8 @@ pub fn parse_final_state(path: &Path, bytes: &[u8]) -> Result<FinalState, StateE
     })
 }
 
-fn best_fitness(path: &Path) -> Result<Vec<f64>, ReadRunError> {
-    let bytes = files::read(path, DATA_BYTES_MAX)?;
+fn best_fitness(path: &Path, most: u64) -> Result<Vec<f64>, ReadRunError> {
+    let bytes = files::read(path, most)?;
     let mut table = csv::Reader::from_reader(bytes.as_slice());
     let mut values = Vec::new();
     for (expected, line) in (0..).zip(table.deserialize()) {
@@ -379,7 +380,7 @@ pub fn complete(path: &Path) -> Result<Option<String>, ReadRunError> {
     let look = || {
         FILES.into_iter().try_for_each(|file| require(path, file))?;
         let state = path.join("final.json");
-        check_version(&state, &files::read(&state, DATA_BYTES_MAX)?)?;
+        check_version(&state, &files::read(&state, FINAL_STATE_BYTES_MAX)?)?;
         recorded_hash(path)
     };
     look().map(Some).map_err(|error| ReadRunError::Damaged {
@@ -460,7 +461,10 @@ impl FinishedRun {
             error,
         })?;
         let state_path = path.join("final.json");
-        let state = parse_final_state(&state_path, &files::read(&state_path, DATA_BYTES_MAX)?)?;
+        let state = parse_final_state(
+            &state_path,
+            &files::read(&state_path, FINAL_STATE_BYTES_MAX)?,
+        )?;
         let inconsistent = |problem| {
             Err(ReadRunError::Inconsistent {
                 path: path.to_owned(),
@@ -489,7 +493,8 @@ impl FinishedRun {
         if state.hash != hash {
             return inconsistent("final.json has another hash than DONE");
         }
-        let best_fitness = best_fitness(&path.join("generations.csv"))?;
+        let table_bytes = limits::most(limits::table_bytes(&settings));
+        let best_fitness = best_fitness(&path.join("generations.csv"), table_bytes)?;
         if best_fitness.len() != settings.generations as usize {
             return inconsistent(
                 "generations.csv has another number of lines than config.toml has generations",

@@ -21,6 +21,7 @@ pub mod files;
 pub mod finished_run;
 pub mod generation_work;
 pub mod hil;
+pub mod limits;
 pub mod lock;
 pub mod new_dir;
 mod ranges;

@@ -15,8 +15,9 @@
 
 use crate::checkpoint::{self, CheckpointError};
 use crate::experiment::{Experiment, Finding};
-use crate::files::{self, DATA_BYTES_MAX, FileError, TEXT_BYTES_MAX};
+use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::finished_run::{ReadRunError, complete};
+use crate::limits::{self, Needs, TooMuch};
 use crate::lock::{Holder, LOCK, Lock, LockError};
 use crate::new_dir::NewDir;
 use crate::report::tables;
@@ -85,6 +86,9 @@ pub enum RunDirError {
     /// The environment asks for a path of the engine that there is not.
     #[error(transparent)]
     EnginePath(#[from] PathError),
+    /// It takes more than this machine has.
+    #[error(transparent)]
+    TooMuch(#[from] TooMuch),
     /// The checkpoint in it cannot be continued from.
     #[error("{}: {error}", path.display())]
     Checkpoint {
@@ -304,9 +308,12 @@ fn unfinished(path: &Path) -> Result<(Experiment, String, TimeSpent), RunDirErro
     // The first population is in the checkpoint; its ancestor need not exist any more.
     given.forget("from");
     let settings = Settings::resolve(&given, || 0)?;
+    Needs::of_evolution(&settings, limits::threads(None)).check_memory()?;
     let text = String::from_utf8_lossy(&read(&config, TEXT_BYTES_MAX)?).into_owned();
-    let experiment = checkpoint::decode(&read(&checkpoint, DATA_BYTES_MAX)?, settings, &text)
-        .map_err(|error| RunDirError::Checkpoint {
+    let most = limits::most(limits::checkpoint_bytes(&settings));
+    let bytes = read(&checkpoint, most)?;
+    let experiment =
+        checkpoint::decode(&bytes, settings, &text).map_err(|error| RunDirError::Checkpoint {
             path: checkpoint,
             error,
         })?;

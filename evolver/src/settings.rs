@@ -212,6 +212,24 @@ impl Given {
     }
 }
 
+/// Largest seed that is drawn: whole numbers up to here are exact in programs that compute JSON's
+/// numbers in floating point.
+pub const DRAWN_SEED_MAX: u64 = 1 << 53;
+
+/// A seed as text, for JSON, if other programs would read another number.
+#[must_use]
+pub fn seed_text(seed: u64) -> Option<String> {
+    (seed > DRAWN_SEED_MAX).then(|| seed.to_string())
+}
+
+/// Adds a seed to an object of JSON, and as `seed_text` if need be.
+pub fn add_seed(object: &mut serde_json::Value, seed: u64) {
+    object["seed"] = seed.into();
+    if let Some(text) = seed_text(seed) {
+        object["seed_text"] = text.into();
+    }
+}
+
 /// Checked settings of an evolution: all that its result depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -282,6 +300,14 @@ impl Settings {
         let scenario = Scenario::new(grid, robots, steps, noise_rate)
             .map_err(|error| given.invalid("robots", error.to_string()))?;
         let population = given.value("population", 50, |text| count(text, COUNT_MAX))?;
+        let matches_max = scenario.scored_bits(topology.sensors());
+        if matches_max.checked_mul(population.into()).is_none() {
+            let problem = format!(
+                "{robots} robots and {steps} steps: the matches of a generation would not fit 64 \
+                 bits; lower one of the three"
+            );
+            return Err(given.invalid("population", problem));
+        }
         let generations = given.value("generations", 100, |text| count(text, COUNT_MAX))?;
         let repetitions = given.value("repetitions", 10, |text| count(text, COUNT_MAX))?;
         let from = given.value("from", None, |text| {

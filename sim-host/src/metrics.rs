@@ -99,6 +99,7 @@ pub struct Measures {
     motion: Motion,
     /// Of each step: bits mispredicted.
     mispredicted: Vec<u64>,
+    mispredicted_so_far: u64,
     /// Of each sensor, how often it was predicted occupied.
     predicted_occupied: [u64; MAX_SENSORS],
 }
@@ -115,6 +116,7 @@ impl Measures {
             mispredicted_now: vec![0; starts.len()],
             motion: Motion::new(grid, starts.len() as u32),
             mispredicted: Vec::new(),
+            mispredicted_so_far: 0,
             predicted_occupied: [0; MAX_SENSORS],
         }
     }
@@ -179,6 +181,7 @@ impl Measures {
             }
         }
         self.mispredicted.push(mispredicted);
+        self.mispredicted_so_far += mispredicted;
         for (prediction, decision) in self.predictions.iter_mut().zip(decisions) {
             *prediction = decision.prediction;
         }
@@ -202,8 +205,7 @@ impl Measures {
     #[must_use]
     pub fn fitness(&self) -> f64 {
         let bits = self.bits_per_step() * u64::from(self.steps());
-        let mispredicted: u64 = self.mispredicted.iter().sum();
-        ratio(bits - mispredicted, bits)
+        ratio(bits - self.mispredicted_so_far, bits)
     }
 
     /// Average prediction of each sensor, 1/(N·T) Σₜ Σₙ pₙʳ(t), from 0 (always empty) to 1 (always

@@ -3,6 +3,7 @@
 use super::evaluate::flag;
 use super::{BadInput, thread_pool};
 use crate::finished_run::FinishedRun;
+use crate::limits::{self, Needs};
 use crate::reevaluation::resilience;
 use crate::report::reevaluation::{resilience_json, resilience_text};
 use crate::settings::count;
@@ -82,6 +83,14 @@ pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
             })?
         }
     };
+    let scenario = finished.settings.scenario;
+    Needs::of_starts(
+        &[(scenario, ())],
+        ("repeat", repeat),
+        limits::threads(threads),
+    )
+    .check_memory()
+    .map_err(BadInput::new)?;
     let rows = thread_pool(threads)?
         .install(|| resilience(&finished, structure, damage, repeat))
         .map_err(|error| about_area(&error))?;

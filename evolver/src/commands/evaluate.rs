@@ -2,6 +2,7 @@
 
 use super::{BadInput, genome_file, thread_pool};
 use crate::files;
+use crate::limits::{self, Needs};
 use crate::reevaluation::rerun;
 use crate::report::reevaluation::{Condition, conditions_json, conditions_text};
 use crate::settings::{Given, Settings, count, parse_grid, probability};
@@ -99,6 +100,9 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
             }
         }
     }
+    Needs::of_starts(&scenarios, ("starts", starts), limits::threads(threads))
+        .check_memory()
+        .map_err(BadInput::new)?;
     let genome = encoded.to_genome();
     let seeds = SeedTree::new(seed);
     let conditions = thread_pool(threads)?.install(|| {

@@ -7,6 +7,7 @@ use crate::exit::Exit;
 use crate::experiment::Experiment;
 use crate::files;
 use crate::finished_run::FinishedRun;
+use crate::limits::{self, Needs};
 use crate::new_dir::remove_abandoned;
 use crate::replay::recording::Recording;
 use crate::replay::scene::Colouring;
@@ -173,8 +174,17 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
             }
         },
         None => {
-            let settings = Settings::resolve(&given, rand::random).map_err(BadInput::new)?;
+            let settings = Settings::resolve(&given, draw_seed).map_err(BadInput::new)?;
             let seed = settings.seed;
+            let directory = settings::out(&given).unwrap_or_else(|| "runs".into());
+            let needs = Needs::of_evolution(&settings, limits::threads(threads));
+            needs.check_memory().map_err(BadInput::new)?;
+            needs.check_disk(&directory).map_err(BadInput::new)?;
+            if let Some(said) = needs.announcement()
+                && arguments.progress != ProgressMode::None
+            {
+                tell!("{said}");
+            }
             let experiment = Experiment::new(settings);
             let run = match settings::out(&given) {
                 Some(path) => {
@@ -209,6 +219,10 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
     Ok(Exit::Done)
 }
 
+fn draw_seed() -> u64 {
+    rand::random_range(0..=settings::DRAWN_SEED_MAX)
+}
+
 /// Plays a run that has ended.
 fn watch(directory: &Path, stop: &AtomicBool) -> anyhow::Result<()> {
     let recording = Recording::of_run(
@@ -241,13 +255,13 @@ fn generations(
         .ok_or_else(|| anyhow::anyhow!("an evolution has at least one generation"))?;
     run.finish(&experiment, &finding)?;
     if manner.progress == ProgressMode::Json {
-        let done = serde_json::json!({
+        let mut done = serde_json::json!({
             "event": "done",
             "fitness": finding.outcome.fitness(),
-            "seed": experiment.settings().seed,
             "hash": finding.hash.to_string(),
             "run": run.path(),
         });
+        settings::add_seed(&mut done, experiment.settings().seed);
         show_line!("{done}");
     } else {
         show!("\n{}", summary::evolved(&experiment, &finding, run.path()));

@@ -5,6 +5,7 @@ use super::replay::write_file;
 use super::{BadInput, genome_file, read_genome};
 use crate::files::Existing;
 use crate::finished_run::FinishedRun;
+use crate::limits::Needs;
 use crate::report::embedding::{c_header, intel_hex, probe_rs_line, rust_source, slot};
 use crate::settings::count;
 use clap::{Args, ValueEnum};
@@ -118,6 +119,9 @@ fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
         .into());
     }
     let finished = FinishedRun::read_and_check(&arguments.from).map_err(BadInput::new)?;
+    Needs::of_recording(&finished.settings.scenario)
+        .check_memory()
+        .map_err(BadInput::new)?;
     let trace = finished.trace()?;
     let grid = finished.settings.scenario.grid();
     let mut text = Vec::new();

@@ -7,7 +7,8 @@ use super::pictures::PictureArgs;
 use super::{BadInput, read_genome};
 use crate::files::{self, DATA_BYTES_MAX, Existing};
 use crate::finished_run::FinishedRun;
-use crate::replay::page::page;
+use crate::limits::Needs;
+use crate::replay::page::{check_page, page};
 use crate::replay::recording::{Origin, Recording};
 use crate::replay::scene::Colouring;
 use crate::replay::terminal::{self, PlayError};
@@ -16,7 +17,7 @@ use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::damage::Damage;
 use minimal_surprise_sim::exchange::Trajectory;
-use minimal_surprise_sim::{Area, SeedTree};
+use minimal_surprise_sim::{Area, Scenario, SeedTree};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -179,7 +180,7 @@ fn recording(arguments: &ReplayArgs) -> Result<Recording, BadInput> {
                 .map_err(|error| BadInput::new(format!("{name}, {error}")))?;
             Recording::of_trajectory(&name, &trajectory).map_err(BadInput::new)
         }
-        _ => of_genome(conditions, path, &name),
+        _ => of_genome(arguments, path, &name),
     }
 }
 
@@ -188,6 +189,7 @@ fn of_run(
     name: &str,
     finished: &FinishedRun,
 ) -> Result<Recording, BadInput> {
+    check_size(arguments, &finished.settings.scenario)?;
     let grid = finished.settings.scenario.grid();
     let areas = [
         ("remove", &arguments.remove, Damage::Remove as fn(Area) -> _),
@@ -208,12 +210,21 @@ fn of_run(
     Recording::of_damage(name, finished, damage(area)).map_err(|error| about(&error))
 }
 
+/// Refuses what this machine cannot hold, or a page cannot, before a step is computed.
+fn check_size(arguments: &ReplayArgs, scenario: &Scenario) -> Result<(), BadInput> {
+    let needs = Needs::of_recording(scenario);
+    needs.check_memory().map_err(BadInput::new)?;
+    if arguments.html.is_some() {
+        let (robots, steps) = (scenario.robots() as usize, scenario.steps() as usize);
+        check_page(robots, steps, scenario.grid())
+            .map_err(|error| BadInput::new(format!("{}: {error}", arguments.run.display())))?;
+    }
+    Ok(())
+}
+
 /// The run that the flags ask for: the first trial of their seed.
-fn of_genome(
-    conditions: &GenomeConditions,
-    path: &Path,
-    name: &str,
-) -> Result<Recording, BadInput> {
+fn of_genome(arguments: &ReplayArgs, path: &Path, name: &str) -> Result<Recording, BadInput> {
+    let conditions = &arguments.conditions;
     let bytes = read_genome(path)?;
     let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
     let settings = conditions.settings(&encoded)?;
@@ -225,6 +236,7 @@ fn of_genome(
         ..Origin::default()
     };
     let scenario = &settings.scenario;
+    check_size(arguments, scenario)?;
     let trial = scenario.trial(seeds, 0, 0);
     Recording::of_trial(&encoded.to_genome(), scenario, &trial, origin).map_err(BadInput::new)
 }

@@ -5,6 +5,7 @@ use super::{BadInput, name_damaged, stopped, thread_pool};
 use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
 use crate::files::{self, Existing};
+use crate::limits::{self, Needs};
 use crate::replay::gallery;
 use crate::report::progress::ProgressMode;
 use crate::report::suite_progress::{SearchProgress, SuiteProgress, robot_steps};
@@ -311,6 +312,11 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
                 slurm::SubmitError::UnusablePath(_) => BadInput::new(error).into(),
                 other => anyhow::Error::from(other),
             };
+            if !*dry_run {
+                // Memory is that of the machines that the tasks run on.
+                let needs = needs(&plan, plan.runs(), &directory, 1.0);
+                needs.check_disk(&directory).map_err(BadInput::new)?;
+            }
             if *dry_run {
                 show!("{}", job.script().map_err(unusable)?);
             } else {
@@ -547,6 +553,18 @@ fn print_searches(
     }
 }
 
+/// What some runs of a plan take, less those whose directories are there.
+fn needs(plan: &Plan, runs: Runs<'_>, directory: &Path, threads: f64) -> Needs {
+    let all = plan.runs().number().max(1) as f64;
+    let there = fs::read_dir(directory.join("runs")).map_or(0, Iterator::count) as f64;
+    let left = (1.0 - there / all).max(0.0);
+    Needs::of_runs(
+        plan.by_settings(),
+        left * runs.number() as f64 / all,
+        threads,
+    )
+}
+
 /// Which of the runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Share {
@@ -586,6 +604,9 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     // What `evolve` refuses, too, before anything is done.
     CodePath::from_environment().map_err(BadInput::new)?;
     let runs = shard.of_plan(plan);
+    let needs = needs(plan, runs, directory, limits::threads(threads));
+    needs.check_memory().map_err(BadInput::new)?;
+    needs.check_disk(directory).map_err(BadInput::new)?;
     let stop = stop_on_signal()?;
     let pool = thread_pool(threads)?;
     let mut damaged = DamagedRuns::default();

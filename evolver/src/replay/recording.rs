@@ -5,6 +5,7 @@
 //! acts and predicts the next reading.
 
 use crate::finished_run::FinishedRun;
+use crate::report::progress::steps_bar;
 use crate::settings::Settings;
 use crate::steps_hash::{RecordedHash, StepsHash, Version};
 use minimal_surprise_controller::{Controller, Genome, SensorBits, State, Topology};
@@ -140,12 +141,15 @@ impl Recording {
             steps: Vec::new(),
             final_poses: trial.starts.clone(),
         };
+        let bar = steps_bar(scenario);
         run(&controller, scenario, trial, |world| {
+            bar.inc(1);
             trace.record(world);
             hash.observe(world);
             measures.observe(world);
             fitness.push(measures.fitness());
         })?;
+        bar.finish_and_clear();
         let minds = Minds {
             topology,
             noise: trial.noise.clone(),

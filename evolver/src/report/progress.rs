@@ -6,6 +6,7 @@ use crate::settings::Settings;
 use clap::ValueEnum;
 use console::Term;
 use indicatif::{ProgressBar, ProgressStyle};
+use minimal_surprise_sim::Scenario;
 use std::time::{Duration, Instant};
 
 /// Fewest columns of a terminal for a bar beside the numbers.
@@ -73,6 +74,27 @@ impl Shown {
             ProgressMode::Auto | ProgressMode::Bar | ProgressMode::Lines => Self::Lines,
             ProgressMode::Json => Self::Json,
             ProgressMode::None => Self::Nothing,
+        }
+    }
+}
+
+/// Robot-steps from which on a run that is computed in one go takes seconds.
+const LONG_ROBOT_STEPS: u64 = 2_000_000;
+
+/// A bar for a run that is computed in one go, hidden if that is quick. Where no bar can be drawn, a
+/// line says what is going on.
+#[must_use]
+pub fn steps_bar(scenario: &Scenario) -> ProgressBar {
+    let (robots, steps) = (scenario.robots(), scenario.steps());
+    if u64::from(robots) * u64::from(steps) < LONG_ROBOT_STEPS {
+        return ProgressBar::hidden();
+    }
+    let bar = || ProgressBar::new(steps.into());
+    match Shown::new(ProgressMode::Auto, "{pos}/{len} steps", bar) {
+        Shown::Bar(bar) => bar,
+        _ => {
+            tell!("computing {steps} steps of {robots} robots");
+            ProgressBar::hidden()
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::structures::{name_list, names_in_words};
 use crate::reevaluation::{Rerun, ResilienceRow, mean, median};
+use crate::settings::add_seed;
 use minimal_surprise_sim::Scenario;
 use minimal_surprise_sim::structures::{LineOrientation, Structure};
 use serde_json::{Map, Value, json};
@@ -121,11 +122,12 @@ pub fn conditions_json(conditions: &[Condition], seed: u64) -> Value {
             })
         })
         .collect();
-    json!({
+    let mut object = json!({
         "schema_version": super::tables::SCHEMA_VERSION,
-        "seed": seed,
         "conditions": rows,
-    })
+    });
+    add_seed(&mut object, seed);
+    object
 }
 
 /// Rows of Tables 7 and 8 for people: mean, and median in brackets where there are several runs.

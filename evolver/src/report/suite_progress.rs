@@ -2,6 +2,7 @@
 
 use super::progress::{ProgressMode, Shown, seconds};
 use crate::output::for_stderr;
+use crate::settings::add_seed;
 use crate::suite::plan::{Plan, PlannedRun, label};
 use indicatif::ProgressBar;
 use std::cell::{Cell, RefCell};
@@ -165,17 +166,17 @@ impl SearchProgress {
                 "{experiment}: run {number} beyond the plan, {label}, seed {}",
                 run.seed
             ),
-            Shown::Json => show_event!(
-                "{}",
-                serde_json::json!({
+            Shown::Json => {
+                let mut event = serde_json::json!({
                     "event": "further-run",
                     "experiment": experiment,
                     "number": number,
                     "run": run.id,
                     "label": label,
-                    "seed": run.seed,
-                })
-            ),
+                });
+                add_seed(&mut event, run.seed);
+                show_event!("{event}");
+            }
             Shown::Nothing => {}
         }
     }

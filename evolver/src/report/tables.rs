@@ -2,7 +2,7 @@
 
 use super::structures;
 use crate::experiment::{Experiment, Finding};
-use crate::settings::Settings;
+use crate::settings::{Settings, seed_text};
 use minimal_surprise_controller::KERNEL_ID;
 use minimal_surprise_sim::Pose;
 use serde::Serialize;
@@ -16,6 +16,8 @@ pub const SCHEMA_VERSION: u32 = 1;
 struct Meta<'a> {
     schema_version: u32,
     seed: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed_text: Option<String>,
     program: &'a str,
     program_version: &'a str,
     revision: &'a str,
@@ -31,6 +33,7 @@ pub fn meta(settings: &Settings) -> String {
     pretty(&Meta {
         schema_version: SCHEMA_VERSION,
         seed: settings.seed,
+        seed_text: seed_text(settings.seed),
         program: env!("CARGO_PKG_NAME"),
         program_version: env!("CARGO_PKG_VERSION"),
         revision: env!("BUILD_REVISION"),
@@ -46,6 +49,8 @@ struct FinalState<'a> {
     hash: String,
     steps_hash_v2: String,
     seed: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed_text: Option<String>,
     grid: &'a str,
     sensor_model: &'a str,
     robots: u32,
@@ -73,6 +78,7 @@ pub fn final_state(settings: &Settings, finding: &Finding) -> String {
         hash: finding.hash.to_string(),
         steps_hash_v2: finding.steps_hash.to_string(),
         seed: settings.seed,
+        seed_text: seed_text(settings.seed),
         grid: &written.grid,
         sensor_model: &written.sensor_model,
         robots: written.robots,

@@ -15,7 +15,7 @@ use crate::steps_hash::Version;
 use html::Document;
 use minimal_surprise_controller::{Prediction, Topology};
 use minimal_surprise_sim::damage::Damage;
-use minimal_surprise_sim::{Heading, Structure};
+use minimal_surprise_sim::{Grid, Heading, Structure};
 use serde_json::{Value, json};
 
 /// Most robot-steps that a page takes: what a browser opens without trouble.
@@ -45,6 +45,21 @@ pub enum PageError {
     },
 }
 
+/// Whether a page can hold so much.
+///
+/// # Errors
+/// [`PageError`] if there is too much to show.
+pub fn check_page(robots: usize, steps: usize, grid: Grid) -> Result<(), PageError> {
+    if (robots as u64).saturating_mul(steps as u64) > ROBOT_STEPS_MAX {
+        return Err(PageError::TooLong { robots, steps });
+    }
+    let cells = grid.cells();
+    if cells > CELLS_MAX {
+        return Err(PageError::TooWide { cells });
+    }
+    Ok(())
+}
+
 /// The page. In a gallery, it links to the gallery's first page.
 ///
 /// # Errors
@@ -54,14 +69,7 @@ pub fn page(
     colouring: scene::Colouring,
     gallery: Option<&str>,
 ) -> Result<String, PageError> {
-    let (robots, steps) = (recording.robots(), recording.steps());
-    if robots as u64 * steps as u64 > ROBOT_STEPS_MAX {
-        return Err(PageError::TooLong { robots, steps });
-    }
-    let cells = recording.grid.cells();
-    if cells > CELLS_MAX {
-        return Err(PageError::TooWide { cells });
-    }
+    check_page(recording.robots(), recording.steps(), recording.grid)?;
     let (layout, data) = encoding::encode(recording);
     let mut about = about(recording);
     about["layout"] = json!(layout);

@@ -1,0 +1,415 @@
+//! What a machine cannot hold is refused before anything is written, and estimates are near what is
+//! measured.
+#![cfg(unix)]
+
+use embedded_storage::nor_flash::NorFlash;
+use minimal_surprise_controller::Topology;
+use minimal_surprise_evolver::experiment::Experiment;
+use minimal_surprise_evolver::limits::{self, Needs};
+use minimal_surprise_evolver::report::embedding::slot;
+use minimal_surprise_evolver::run_dir::RunDir;
+use minimal_surprise_evolver::settings::{DRAWN_SEED_MAX, Given, Settings};
+use minimal_surprise_link::{Handler, Refusal};
+use minimal_surprise_slots::{Buffer, Slots};
+use robot_support::link_robot::{Flash, LinkRobot};
+use serde_json::Value;
+use std::fs::{self, File};
+use std::process::{Command, Stdio};
+use tests::genome;
+use tests::program::{Evolver, Finished};
+use wait4::Wait4;
+
+/// A tiny evolution, in which one setting at a time is made large.
+const TINY: [(&str, &str); 6] = [
+    ("grid", "5x5"),
+    ("robots", "2"),
+    ("population", "1"),
+    ("generations", "1"),
+    ("repetitions", "1"),
+    ("steps", "1"),
+];
+/// Threads of the program; each has some memory of its own.
+const THREADS: u32 = 2;
+/// What the program takes for itself, in bytes.
+const PROGRAM: f64 = 16e6;
+
+/// The command that runs it.
+fn evolve(settings: &[(&'static str, &str)]) -> Vec<String> {
+    let tiny = TINY
+        .iter()
+        .filter(|(tiny, _)| settings.iter().all(|(key, _)| key != tiny));
+    let flags = tiny
+        .chain(settings)
+        .flat_map(|(key, value)| [format!("--{key}"), (*value).to_owned()]);
+    ["evolve".to_owned()].into_iter().chain(flags).collect()
+}
+
+fn settings(of: &[(&'static str, &str)]) -> Settings {
+    let mut given = Given::default();
+    for (key, value) in TINY.iter().chain(of) {
+        given.flag(key, Some(value));
+    }
+    Settings::resolve(&given, || 1).unwrap()
+}
+
+/// Runs the program to its end; its peak of memory in bytes.
+fn peak(evolver: &Evolver, arguments: &[String]) -> f64 {
+    let child = Command::new(evolver.program())
+        .args(arguments)
+        .current_dir(evolver.folder())
+        // Which works out no more answers than are asked for, and so is quick with many genomes.
+        .env("MINIMAL_SURPRISE_PATH", "portable")
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let ended = child.wait4().unwrap();
+    assert!(ended.status.success(), "{arguments:?}");
+    ended.rusage.maxrss as f64
+}
+
+fn words(line: &str) -> Vec<String> {
+    line.split(' ').map(str::to_owned).collect()
+}
+
+/// Runs the program with less address space than the machine has.
+fn within(evolver: &Evolver, kilobytes: u32, arguments: &[String]) -> Finished {
+    let output = Command::new("sh")
+        .args(["-c", &format!("ulimit -v {kilobytes}; exec \"$@\""), "sh"])
+        .arg(evolver.program())
+        .args(arguments)
+        .current_dir(evolver.folder())
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    Finished {
+        code: output.status.code(),
+        stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+        stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+    }
+}
+
+#[track_caller]
+fn assert_near(what: &str, estimated: f64, measured: f64) {
+    println!("{what}: estimated {estimated:.0}, measured {measured:.0}");
+    assert!(
+        (0.5..=2.0).contains(&(estimated / measured)),
+        "{what}: estimated {estimated:.0}, measured {measured:.0}"
+    );
+}
+
+#[test]
+fn the_memory_of_an_evolution_is_near_its_estimate_whatever_setting_is_large() {
+    for large in [
+        [("population", "20000"), ("steps", "1")],
+        [("repetitions", "100000"), ("robots", "25")],
+        [("grid", "700x700"), ("robots", "400000")],
+        [("grid", "4000x4000"), ("robots", "10")],
+        [("steps", "500000"), ("robots", "2")],
+    ] {
+        let evolver = Evolver::in_empty_folder();
+        let threads = THREADS.to_string();
+        let out = [("threads", threads.as_str()), ("out", "run")];
+        let measured = peak(&evolver, &evolve(&[&large[..], &out].concat()));
+        let needs = Needs::of_evolution(&settings(&large), f64::from(THREADS));
+        assert_near(&format!("{large:?}"), needs.memory() + PROGRAM, measured);
+    }
+}
+
+#[test]
+fn the_memory_of_a_replay_and_of_new_starts_is_near_its_estimate() {
+    let evolver = Evolver::in_empty_folder();
+    let made = evolver.run(&evolve(&[("out", "run")]));
+    assert_eq!(made.code, Some(0), "{made:?}");
+    let genome = "run/best.genome --grid 15x15 --robots 100";
+    let scenario = |steps| {
+        let of = [("grid", "15x15"), ("robots", "100"), ("steps", steps)];
+        settings(&of).scenario
+    };
+    let replay = words(&format!("replay {genome} --steps 30000 --svg still.svg"));
+    let needs = Needs::of_recording(&scenario("30000"));
+    assert_near("replay", needs.memory() + PROGRAM, peak(&evolver, &replay));
+
+    let evaluate = words(&format!(
+        "evaluate {genome} --steps 1 --starts 30000 --threads {THREADS}"
+    ));
+    let scenarios = [(scenario("1"), ())];
+    let needs = Needs::of_starts(&scenarios, ("starts", 30_000), f64::from(THREADS));
+    assert_near(
+        "evaluate",
+        needs.memory() + PROGRAM,
+        peak(&evolver, &evaluate),
+    );
+}
+
+#[test]
+fn the_files_of_a_run_have_nearly_the_estimated_sizes() {
+    let scratch = tempfile::tempdir().unwrap();
+    for of in [[("population", "3000")], [("population", "300")]] {
+        let settings = settings(&of);
+        let estimated = limits::checkpoint_bytes(&settings);
+        let path = scratch.path().join(of[0].1);
+        let run = RunDir::create(&path, &Experiment::new(settings)).unwrap();
+        let measured = fs::metadata(run.path().join("checkpoint")).unwrap().len();
+        assert_near("checkpoint", estimated, measured as f64);
+    }
+    let evolver = Evolver::in_empty_folder();
+    for (out, of) in [
+        (
+            "long",
+            [("generations", "200"), ("steps", "2000"), ("robots", "20")],
+        ),
+        (
+            "wide",
+            [
+                ("generations", "100"),
+                ("grid", "200x200"),
+                ("robots", "5000"),
+            ],
+        ),
+    ] {
+        let made = evolver.run(&evolve(&[&of[..], &[("out", out)]].concat()));
+        assert_eq!(made.code, Some(0), "{made:?}");
+        let settings = settings(&of);
+        let size = |name: &str| evolver.read(&format!("{out}/{name}")).len() as f64;
+        assert_near(
+            "generations.csv",
+            limits::table_bytes(&settings),
+            size("generations.csv"),
+        );
+        assert_near(
+            "final.json",
+            limits::final_state_bytes(&settings),
+            size("final.json"),
+        );
+    }
+}
+
+/// A suite of so many runs.
+fn suite(evolver: &Evolver, runs: u32, robots: u32) {
+    let robots: Vec<String> = (1..=robots).map(|n| n.to_string()).collect();
+    let text = format!(
+        "name = \"large\"\n[[experiment]]\nname = \"one\"\nruns = {runs}\nrobots = [{}]\n\
+         grids = [\"40x40\"]\npopulation = 2\ngenerations = 1\nrepetitions = 1\nsteps = 2\n",
+        robots.join(", ")
+    );
+    evolver.write("large.toml", text.as_bytes());
+}
+
+#[test]
+fn what_this_machine_cannot_hold_is_refused_before_anything_is_written() {
+    let evolver = Evolver::in_empty_folder();
+    let made = evolver.run(&evolve(&[("out", "run")]));
+    assert_eq!(made.code, Some(0), "{made:?}");
+    suite(&evolver, 1_000_000, 1200);
+    evolver.write(
+        "memory.toml",
+        b"name = \"m\"\n[[experiment]]\nname = \"one\"\nruns = 1\npopulation = 1000000\n",
+    );
+    let files = evolver.files();
+    for (arguments, said) in [
+        (
+            "evolve --population 1000000 --out new",
+            "population = 1000000",
+        ),
+        (
+            "evolve --repetitions 1000000 --robots 225 --out new",
+            "repetitions = 1000000",
+        ),
+        (
+            "evolve --grid 16384x16384 --robots 268435456 --out new",
+            "robots = 268435456",
+        ),
+        ("evolve --steps 4294967295 --out new", "steps = 4294967295"),
+        (
+            "evaluate run --grid 100x100 --robots 10000 --starts 1000000",
+            "starts = 1000000",
+        ),
+        (
+            "replay run/best.genome --steps 4294967295 --html page.html",
+            "steps = 4294967295",
+        ),
+        (
+            "replay run/best.genome --steps 4294967295",
+            "steps = 4294967295",
+        ),
+        ("suite memory.toml run --out new", "population = 1000000"),
+        (
+            "run-task --suite memory.toml --shard 0/1 --out new",
+            "population = 1000000",
+        ),
+    ] {
+        let refused = within(&evolver, 2_000_000, &words(arguments));
+        assert_eq!(refused.code, Some(2), "{arguments}: {refused:?}");
+        assert!(refused.stderr.contains(said), "{arguments}: {refused:?}");
+        assert_eq!(evolver.files(), files, "{arguments}");
+        for word in ["of memory would be needed", "are available"] {
+            assert!(refused.stderr.contains(word), "{arguments}: {refused:?}");
+        }
+    }
+    for arguments in [
+        "suite large.toml run --out new",
+        "run-task --suite large.toml --shard 0/2 --out new",
+        "suite large.toml submit --engine slurm --out new",
+    ] {
+        let refused = evolver.run(&words(arguments));
+        assert_eq!(refused.code, Some(2), "{arguments}: {refused:?}");
+        for word in [
+            "1200000000 runs in the suite",
+            "of disk would be needed",
+            "are free in new",
+        ] {
+            assert!(refused.stderr.contains(word), "{arguments}: {refused:?}");
+        }
+        assert_eq!(evolver.files(), files, "{arguments}");
+    }
+    let done = within(&evolver, 2_000_000, &evolve(&[("out", "new")]));
+    assert_eq!(done.code, Some(0), "{done:?}");
+}
+
+#[test]
+fn a_million_runs_are_planned_counted_and_shared_out_in_a_hundred_megabytes() {
+    for (runs, combinations) in [(1_000_000, 1), (1000, 1000)] {
+        let evolver = Evolver::in_empty_folder();
+        suite(&evolver, runs, combinations);
+        for arguments in [
+            "suite large.toml plan",
+            "suite large.toml submit --engine slurm --dry-run",
+            "run-task --suite large.toml --shard 999999/1000000 --out suite",
+        ] {
+            let peak = peak(&evolver, &words(arguments));
+            println!("{runs} runs of {combinations} settings, {arguments}: {peak:.0} bytes");
+            assert!(peak <= 100e6, "{arguments}: {peak:.0} bytes");
+        }
+        let plan = evolver.run(&["suite", "large.toml", "plan"]);
+        assert!(plan.stdout.contains("1000000 different runs"), "{plan:?}");
+    }
+    let evolver = Evolver::in_empty_folder();
+    suite(&evolver, 1_000_000, 1200);
+    let plan = evolver.run(&["suite", "large.toml", "plan"]);
+    assert!(
+        plan.stdout.contains("1200000000 different runs"),
+        "{plan:?}"
+    );
+}
+
+#[test]
+fn no_reader_takes_more_than_what_it_reads_can_be() {
+    let evolver = Evolver::in_empty_folder();
+    let large = File::create(evolver.folder().join("large")).unwrap();
+    large.set_len(1 << 30).unwrap();
+    for command in [
+        "inspect large",
+        "evaluate large",
+        "replay large",
+        "classify large",
+    ] {
+        let refused = within(&evolver, 900_000, &words(command));
+        assert_eq!(refused.code, Some(2), "{command}: {refused:?}");
+        for word in ["large: it has 1073741824 bytes", "at most"] {
+            assert!(refused.stderr.contains(word), "{command}: {refused:?}");
+        }
+    }
+    for command in [
+        "inspect /dev/zero",
+        "replay /dev/zero",
+        "classify /dev/zero",
+    ] {
+        let refused = within(&evolver, 900_000, &words(command));
+        assert_eq!(refused.code, Some(2), "{command}: {refused:?}");
+        assert!(
+            refused.stderr.contains("it does not end"),
+            "{command}: {refused:?}"
+        );
+    }
+    let pipe = "mkfifo pipe; yes > pipe & exec \"$0\" inspect pipe";
+    let refused = Command::new("sh")
+        .args(["-c", pipe])
+        .arg(evolver.program())
+        .current_dir(evolver.folder())
+        .output()
+        .unwrap();
+    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+    assert!(
+        String::from_utf8_lossy(&refused.stderr).contains("it does not end"),
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn seeds_are_the_same_number_in_programs_that_compute_in_floating_point() {
+    let evolver = Evolver::in_empty_folder();
+    let json = |name: &str| -> Value { serde_json::from_slice(&evolver.read(name)).unwrap() };
+    for run in ["a", "b", "c", "d"] {
+        let done = evolver.run(&evolve(&[("out", run)]));
+        assert_eq!(done.code, Some(0), "{done:?}");
+        for file in ["meta.json", "final.json"] {
+            let read = json(&format!("{run}/{file}"));
+            assert!(read["seed"].as_u64().unwrap() <= DRAWN_SEED_MAX, "{read}");
+            assert!(read.get("seed_text").is_none(), "{read}");
+        }
+    }
+    let largest = u64::MAX.to_string();
+    let done = evolver.run(&evolve(&[
+        ("out", "run"),
+        ("seed", &largest),
+        ("progress", "json"),
+    ]));
+    let last: Value = serde_json::from_str(done.stdout.lines().last().unwrap()).unwrap();
+    let evaluated = evolver.run(&["evaluate", "run", "--starts", "1", "--json"]);
+    let evaluated: Value = serde_json::from_str(&evaluated.stdout).unwrap();
+    for said in [
+        json("run/meta.json"),
+        json("run/final.json"),
+        last,
+        evaluated,
+    ] {
+        assert_eq!(said["seed"].as_u64(), Some(u64::MAX), "{said}");
+        assert_eq!(said["seed_text"].as_str(), Some(largest.as_str()), "{said}");
+    }
+    let classified = evolver.run(&["classify", "run"]);
+    assert_eq!(classified.code, Some(0), "{classified:?}");
+}
+
+#[test]
+fn a_long_replay_says_what_it_computes() {
+    let evolver = Evolver::in_empty_folder();
+    let made = evolver.run(&evolve(&[("out", "run")]));
+    assert_eq!(made.code, Some(0), "{made:?}");
+    let replay = "replay run/best.genome --grid 5x5 --robots 20 --steps 100000 --svg still.svg";
+    let done = evolver.run(&words(replay));
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert!(
+        done.stderr.contains("computing 100000 steps of 20 robots"),
+        "{done:?}"
+    );
+}
+
+#[test]
+fn a_robot_that_can_count_no_more_genomes_says_so_and_no_export_makes_one() {
+    let container = genome::random(1, Topology::default());
+    let mut exhausted = slot(&container, u32::MAX);
+    exhausted.resize(exhausted.len().next_multiple_of(Flash::WRITE_SIZE), 0xff);
+    let mut flash = Flash::new();
+    flash.write(Flash::OFFSET, &exhausted).unwrap();
+    let mut robot = LinkRobot::start(flash);
+    assert_eq!(robot.slots.write_count(), u32::MAX);
+    assert_eq!(robot.begin(100, 0), Err(Refusal::CountExhausted));
+    // The way back: with both slots erased, it counts from 1 again.
+    let mut flash = robot.stop();
+    let end = Flash::OFFSET + 2 * Slots::<Flash>::SLOT_BYTES as u32;
+    flash.erase(Flash::OFFSET, end).unwrap();
+    let mut room = Buffer::new();
+    let mut slots = Slots::open(flash, Flash::OFFSET, &mut room).unwrap();
+    assert_eq!(slots.write(&container, &mut room), Ok(1));
+
+    let evolver = Evolver::in_empty_folder();
+    evolver.write("a.genome", &container);
+    for (count, code) in [("4294967295", 2), ("4278190080", 2), ("4278190079", 0)] {
+        let export = format!("export a.genome --format slot --write-count {count} --out {count}");
+        let exported = evolver.run(&words(&export));
+        assert_eq!(exported.code, Some(code), "{exported:?}");
+        let said = exported.stderr.contains("from 1 to 4278190079");
+        assert_eq!(said, code == 2, "{exported:?}");
+    }
+}
