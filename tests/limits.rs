@@ -233,6 +233,10 @@ fn what_this_machine_cannot_hold_is_refused_before_anything_is_written() {
             "replay run/best.genome --steps 4294967295",
             "steps = 4294967295",
         ),
+        (
+            "hil run/best.genome --simulate --steps 4294967295",
+            "steps = 4294967295",
+        ),
         ("suite memory.toml run --out new", "population = 1000000"),
         (
             "run-task --suite memory.toml --shard 0/1 --out new",

@@ -199,7 +199,7 @@ impl Needs {
         let mut memory = Vec::new();
         for (scenario, _) in scenarios {
             let [robots, cells, _] = world(scenario);
-            let outcome = 200.0 + 2.0 * robots * size::<Pose>();
+            let outcome = 200.0 + 1.2 * robots * size::<Pose>();
             let grid = scenario.grid();
             let setting = format!("{key} = {starts} or robots = {}", scenario.robots());
             memory.push(Part {
@@ -243,6 +243,18 @@ impl Needs {
                     ),
                 },
             ],
+            disk: Vec::new(),
+        }
+    }
+
+    /// A run with a robot in it: what robot 0 decides, there and in the simulation.
+    #[must_use]
+    pub fn of_hil(scenario: &Scenario) -> Self {
+        let [robots, cells, steps] = world(scenario);
+        let settings = [("steps", scenario.steps()), ("robots", scenario.robots())];
+        let bytes = 2.0 * steps * size::<Decision>() + robots * ROBOT_BYTES + cells * 5.0;
+        Self {
+            memory: vec![part(bytes, "the decisions", settings)],
             disk: Vec::new(),
         }
     }

@@ -7,6 +7,7 @@ use super::{BadInput, read_genome};
 use crate::exit::Exit;
 use crate::finished_run::FinishedRun;
 use crate::hil::{Course, HilError, Ran};
+use crate::limits::Needs;
 use crate::report::progress;
 use crate::robot::{Afterwards, Robot, RobotError, describe, is_in_use};
 use crate::text::shell_path;
@@ -41,6 +42,9 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
     } else {
         of_genome(arguments)?
     };
+    Needs::of_hil(&course.scenario)
+        .check_memory()
+        .map_err(BadInput::new)?;
     let simulated = course.simulate().map_err(BadInput::new)?;
     let Some(port) = &arguments.port else {
         show_line!("hash        {}", simulated.hash);
