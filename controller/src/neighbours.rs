@@ -186,6 +186,22 @@ mod tests {
     }
 
     #[test]
+    fn bearings_of_any_number_of_turns_are_taken_modulo_a_turn() {
+        for bearing in [7.0, 1e3, 1e5, 1e7, 1e9, 1e20, f32::MAX] {
+            let within_a_turn = (f64::from(bearing) % f64::from(TAU)) as f32;
+            for sign in [1.0, -1.0] {
+                for range in [100.0, 141.0, 200.0] {
+                    assert_eq!(
+                        bits(SensorModel::C, &[(range, sign * bearing)]),
+                        bits(SensorModel::C, &[(range, sign * within_a_turn)]),
+                        "{range} mm at {bearing} rad"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_neighbour_on_a_border_belongs_to_the_cell_further_ahead_or_further_left() {
         let ahead_1 = 1 << 0;
         let ahead_2 = 1 << 3;

@@ -172,7 +172,7 @@ impl Handler for Recorder {
         self.calls += 1;
         Identity {
             firmware: "recorder with a name that is much longer than fits a frame, ä, ö, ü",
-            version: "0.1.0",
+            version: "0.1.0-with-more-than-fits",
             kernel: KERNEL_ID,
             genome: GenomeInUse::BuiltIn,
             running: false,
@@ -773,6 +773,7 @@ fn the_longest_messages_fit_a_frame() {
         panic!("not an identity");
     };
     assert_eq!(identity.firmware, "recorder with a name that is muc");
+    assert_eq!(identity.version, "0.1.0-with-more-");
     let all = u32::MAX;
     let surprise = Surprise {
         mispredicted_bits: u64::MAX,

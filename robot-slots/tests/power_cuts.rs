@@ -7,7 +7,7 @@
 //! makes one pair of cuts; a failure prints it.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
-use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, Provenance, encode};
+use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, CRC_32C, Provenance, encode};
 use minimal_surprise_controller::{EncodedGenome, Genome, Topology};
 use minimal_surprise_slots::{
     Buffer, COMMIT_AT, CONTAINER_AT, Defect, Header, InPlace, InUse, PlaceError, Slot, SlotState,
@@ -673,6 +673,15 @@ fn what_is_not_the_announced_genome_is_never_committed() {
         Err(UpdateError::Defect(Defect::Refused(_)))
     ));
     assert_eq!(slots.release().counts.erases, erases, "nothing was erased");
+}
+
+#[test]
+fn a_container_ends_with_the_checksum_of_what_comes_before() {
+    let genome = container(Topology::default(), 1);
+    let (body, _) = genome.split_at(genome.len() - 4);
+    assert_eq!(crc_of(&genome), Some(CRC_32C.checksum(body)));
+    assert_eq!(crc_of(&[9, 4, 3, 2, 1]), Some(0x0102_0304));
+    assert_eq!(crc_of(&[1, 2, 3]), None);
 }
 
 #[test]
