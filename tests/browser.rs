@@ -41,8 +41,9 @@ fn succeed(evolver: &Evolver, line: &str) -> Finished {
     run
 }
 
-fn assert_refused(run: &Finished, words: &[&str]) {
-    assert_eq!(run.code, Some(2), "{run:?}");
+/// 2 if the input cannot be used, 1 if a run is damaged.
+fn assert_refused(run: &Finished, code: i32, words: &[&str]) {
+    assert_eq!(run.code, Some(code), "{run:?}");
     for word in words {
         assert!(run.stderr.contains(word), "no {word:?} in {run:?}");
     }
@@ -191,6 +192,7 @@ fn a_page_whose_steps_are_not_those_of_the_run_says_so() {
     // The program refuses such a run; a page may be changed later.
     assert_refused(
         &run(&evolver, "replay runs/run --html run.html"),
+        1,
         &["runs/run", "another run's"],
     );
     let recording = recording_of(&evolver, "runs/run");
@@ -564,11 +566,12 @@ fn a_long_run_of_a_thousand_robots_opens_and_plays() {
 #[test]
 fn what_cannot_be_shown_is_refused_and_nothing_is_overwritten() {
     let evolver = with_runs(&[("run", "--seed 4 --steps 30")]);
-    let refused = |line: &str, words: &[&str]| {
+    let refused_with = |code: i32, line: &str, words: &[&str]| {
         let before = evolver.files();
-        assert_refused(&run(&evolver, line), words);
+        assert_refused(&run(&evolver, line), code, words);
         assert_eq!(evolver.files(), before, "{line}");
     };
+    let refused = |line: &str, words: &[&str]| refused_with(2, line, words);
     evolver.write("there.html", b"mine");
     refused(
         "replay runs/run --html there.html",
@@ -622,8 +625,13 @@ fn what_cannot_be_shown_is_refused_and_nothing_is_overwritten() {
             "truncated" => "final.json",
             _ => "DONE",
         };
-        refused(&format!("replay {name} --html out.html"), &[name, word]);
-        refused(&format!("gallery {name} --out new"), &[name, word]);
+        let code = if name == "unfinished" { 2 } else { 1 };
+        refused_with(
+            code,
+            &format!("replay {name} --html out.html"),
+            &[name, word],
+        );
+        refused_with(code, &format!("gallery {name} --out new"), &[name, word]);
     }
     // Among others, a run that has not ended is left out.
     fs::rename(

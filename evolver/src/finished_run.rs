@@ -338,7 +338,7 @@ fn best_fitness(path: &Path, most: u64) -> Result<Vec<f64>, ReadRunError> {
 }
 
 /// Marks a run as complete, and holds its hash.
-const DONE: &str = "DONE";
+pub(crate) const DONE: &str = "DONE";
 
 /// The other files of a complete run that it cannot be read back without.
 const FILES: [&str; 5] = [

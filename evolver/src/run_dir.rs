@@ -16,7 +16,7 @@
 use crate::checkpoint::{self, CheckpointError};
 use crate::experiment::{Experiment, Finding};
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
-use crate::finished_run::{ReadRunError, complete};
+use crate::finished_run::{DONE, ReadRunError, complete};
 use crate::limits::{self, Needs, TooMuch};
 use crate::lock::{self, Holder, LOCK, Lock, LockError};
 use crate::new_dir::NewDir;
@@ -116,7 +116,6 @@ const META: &str = "meta.json";
 const GENERATIONS: &str = "generations.csv";
 const BEST: &str = "best.genome";
 const FINAL: &str = "final.json";
-const DONE: &str = "DONE";
 
 /// What `--resume` finds.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
 use crate::files::FileError;
-use crate::finished_run::ReadRunError;
+use crate::finished_run::{DONE, ReadRunError};
 use crate::output;
 use crate::replay::gallery::GalleryError;
 use crate::run_dir::RunDirError;
@@ -116,7 +116,8 @@ impl AboutInput for SettingError {
 impl AboutInput for ReadRunError {
     fn is_bad_input(&self) -> bool {
         match self {
-            Self::NotComplete { .. } => true,
+            // Marked complete, it lacks something else.
+            Self::NotComplete { missing, .. } => *missing == DONE,
             Self::File(error) => error.is_bad_input(),
             _ => false,
         }
