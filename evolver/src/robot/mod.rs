@@ -334,3 +334,14 @@ fn identify(line: &mut Line) -> Result<Identity, RobotError> {
 fn printable(firmware: &str, version: &str) -> String {
     terminal(&format!("{firmware} {version}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_of_a_robot_cannot_control_a_terminal() {
+        let name = printable("a\u{1b}[2J\u{202e}b", "1\n");
+        assert_eq!(name, r"a\u{1b}[2J\u{202e}b 1\n");
+    }
+}
