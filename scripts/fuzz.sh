@@ -22,12 +22,14 @@ host=$(rustc -vV | sed -n 's/^host: //p')
 coverage='-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
     -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table
     -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1'
+# What the tests are locked to, and libFuzzer.
+cp Cargo.lock fuzz/Cargo.lock
 # With --target, build scripts and macros are built without all this.
-RUSTFLAGS="$coverage -Cdebug-assertions" cargo build --locked --release \
+RUSTFLAGS="$coverage -Cdebug-assertions" cargo build --release \
     --manifest-path fuzz/Cargo.toml --target "$host"
 
 # shellcheck disable=SC2016 # for the inner shell
-printf '%s\n' "$@" | xargs -P "$(getconf _NPROCESSORS_ONLN)" -I TARGET sh -c '
+printf '%s\n' "$@" | xargs -P "$(getconf _NPROCESSORS_ONLN)" -I {} sh -c '
     grown=fuzz/target/corpus/$1 log=fuzz/target/$1.log
     mkdir -p "$grown"
     if FUZZ_TARGET=$1 "fuzz/target/$2/release/readers" "$grown" "tests/fuzz-corpus/$1" \
@@ -35,4 +37,4 @@ printf '%s\n' "$@" | xargs -P "$(getconf _NPROCESSORS_ONLN)" -I TARGET sh -c '
         -print_final_stats=1 -artifact_prefix="tests/fuzz-corpus/$1/found-" >"$log" 2>&1
     then echo "$1: $(sed -n "s/^stat::number_of_executed_units: *//p" "$log") inputs"
     else echo "$1 failed:" && tail -n 40 "$log" && exit 1
-    fi' sh TARGET "$host" "$seconds"
+    fi' sh {} "$host" "$seconds"
