@@ -138,7 +138,7 @@ cargo package --locked --workspace --exclude tests --exclude robot-support --all
 
 say 'tests'
 # shellcheck disable=SC2086 # an option and its value
-cargo test --locked --workspace --all-features -- --show-output $without_slurm
+cargo test --locked --workspace --all-features --no-fail-fast -- --show-output $without_slurm
 if [ -n "${TEST_ALL:-}" ]; then
     say 'every power cut after every power cut'
     cargo test --locked --release --package minimal-surprise-slots --test power_cuts -- --show-output
