@@ -123,10 +123,8 @@ fn arguments() -> Cli {
             true => output::try_write(format_args!("{}", error.render())),
             false => error.print(),
         };
-        match printed {
-            Ok(()) => Exit::Done.now(),
-            Err(error) => output::end(&error),
-        }
+        output::check(printed);
+        Exit::Done.now()
     })
 }
 

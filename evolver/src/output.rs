@@ -132,25 +132,28 @@ pub(crate) fn try_write(text: Arguments<'_>) -> io::Result<()> {
     stdout.flush()
 }
 
-/// Writes a report to standard output; ends the program if that fails.
+/// Writes a report to standard output.
 pub(crate) fn write(text: Arguments<'_>) {
-    try_write(text).unwrap_or_else(|error| end(&error));
+    check(try_write(text));
 }
 
 /// The same for bytes.
 pub(crate) fn write_bytes(bytes: &[u8]) {
     let mut stdout = stdout();
     let written = stdout.write_all(bytes).and_then(|()| stdout.flush());
-    written.unwrap_or_else(|error| end(&error));
+    check(written);
 }
 
-/// Ends the program: quietly, if nobody reads standard output any more.
-pub(crate) fn end(error: &io::Error) -> ! {
-    if is_gone(error) {
-        Exit::Done.now();
+/// Ends the program if a report could not be written. One that nobody reads any more is dropped: the
+/// exit code still tells how it went.
+pub(crate) fn check(written: io::Result<()>) {
+    match written {
+        Err(error) if !is_gone(&error) => {
+            tell(format_args!("error: standard output: {error}\n"));
+            Exit::Failure.now()
+        }
+        _ => {}
     }
-    tell(format_args!("error: standard output: {error}\n"));
-    Exit::Failure.now()
 }
 
 /// Writes to standard output while there is work to do. If that fails, the work is asked to stop

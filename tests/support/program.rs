@@ -119,7 +119,10 @@ impl Evolver {
     }
 
     fn command(&self, arguments: &[impl AsRef<OsStr>]) -> Command {
-        let mut command = Command::new(&self.program);
+        self.called_by(Command::new(&self.program), arguments)
+    }
+
+    fn called_by(&self, mut command: Command, arguments: &[impl AsRef<OsStr>]) -> Command {
         command
             .args(arguments)
             .current_dir(self.folder())
@@ -154,7 +157,14 @@ impl Evolver {
     /// If it cannot be started.
     #[must_use]
     pub fn start(&self, arguments: &[impl AsRef<OsStr>]) -> Running {
-        let mut child = self.command(arguments).spawn().expect("the program starts");
+        // It ends by signals, also where the tests themselves ignore them, as in the background.
+        let mut command = Command::new("env");
+        if cfg!(target_os = "linux") {
+            command.arg("--default-signal=INT,TERM,HUP");
+        }
+        command.arg(&self.program);
+        let mut command = self.called_by(command, arguments);
+        let mut child = command.spawn().expect("the program starts");
         let stderr = BufReader::new(child.stderr.take().expect("it is piped"));
         let (sender, lines) = channel();
         std::thread::spawn(move || {

@@ -128,8 +128,10 @@ impl AboutInput for RunDirError {
     fn is_bad_input(&self) -> bool {
         match self {
             Self::Exists(_) | Self::NotARun { .. } => true,
-            Self::File(error) => error.is_bad_input(),
-            _ => false,
+            Self::EnginePath(_) | Self::TooMuch(_) => true,
+            Self::NotThere(error) | Self::File(error) => error.is_bad_input(),
+            Self::Damaged(error) => error.is_bad_input(),
+            Self::InUse { .. } | Self::Settings(_) | Self::Checkpoint { .. } => false,
         }
     }
 }
