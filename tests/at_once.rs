@@ -219,37 +219,37 @@ fn of_two_galleries_at_once_one_is_there_as_a_whole_and_a_folder_of_the_users_st
     let gallery = "gallery . --out g --threads 1";
     assert_success(&at_once(&evolver, Locks::Working, &[gallery]), gallery);
     let (expected, runs) = (contents(&evolver, "g/"), contents(&evolver, "suite/"));
-    for start in 0..times(6, 500) {
-        for (locks, overwrite) in ALL_LOCKS.into_iter().flat_map(|l| [(l, false), (l, true)]) {
-            let what = format!("start {start} with {locks:?} locks, overwriting: {overwrite}");
-            fs::remove_dir_all(evolver.folder().join("g")).unwrap();
-            fs::create_dir_all(evolver.folder().join(".g.part")).unwrap();
-            evolver.write(".g.part/mother.txt", b"dear");
-            let line = if overwrite {
-                format!("{gallery} --overwrite")
-            } else {
-                gallery.to_owned()
-            };
-            let outputs = at_once(&evolver, locks, &[&line, &line]);
-            let mut codes = [0, 1].map(|one: usize| outputs[one].status.code());
-            codes.sort_unstable();
-            assert_eq!(codes[0], Some(0), "{what}: {outputs:?}");
-            if overwrite {
-                assert_eq!(codes[1], Some(0), "{what}: {outputs:?}");
-            } else {
-                assert_eq!(codes[1], Some(2), "{what}: {outputs:?}");
-                let exists =
-                    |output: &Output| String::from_utf8_lossy(&output.stderr).contains("g exists");
-                assert!(outputs.iter().any(exists), "{what}: {outputs:?}");
-            }
-            assert_equal(&contents(&evolver, "g/"), &expected, &what);
-            assert_equal(&contents(&evolver, "suite/"), &runs, &what);
-            assert_eq!(evolver.read(".g.part/mother.txt"), b"dear", "{what}");
-            let parts = fs::read_dir(evolver.folder()).unwrap().flatten();
-            let parts =
-                parts.filter(|entry| entry.file_name().to_string_lossy().ends_with(".part"));
-            assert_eq!(parts.count(), 1, "{what}: only that of the user");
+    let ways = ALL_LOCKS
+        .into_iter()
+        .flat_map(|locks| [(locks, false), (locks, true)]);
+    for (start, (locks, overwrite)) in (0..times(6, 600)).zip(ways.cycle()) {
+        let what = format!("start {start} with {locks:?} locks, overwriting: {overwrite}");
+        fs::remove_dir_all(evolver.folder().join("g")).unwrap();
+        fs::create_dir_all(evolver.folder().join(".g.part")).unwrap();
+        evolver.write(".g.part/mother.txt", b"dear");
+        let line = if overwrite {
+            format!("{gallery} --overwrite")
+        } else {
+            gallery.to_owned()
+        };
+        let outputs = at_once(&evolver, locks, &[&line, &line]);
+        let mut codes = [0, 1].map(|one: usize| outputs[one].status.code());
+        codes.sort_unstable();
+        assert_eq!(codes[0], Some(0), "{what}: {outputs:?}");
+        if overwrite {
+            assert_eq!(codes[1], Some(0), "{what}: {outputs:?}");
+        } else {
+            assert_eq!(codes[1], Some(2), "{what}: {outputs:?}");
+            let exists =
+                |output: &Output| String::from_utf8_lossy(&output.stderr).contains("g exists");
+            assert!(outputs.iter().any(exists), "{what}: {outputs:?}");
         }
+        assert_equal(&contents(&evolver, "g/"), &expected, &what);
+        assert_equal(&contents(&evolver, "suite/"), &runs, &what);
+        assert_eq!(evolver.read(".g.part/mother.txt"), b"dear", "{what}");
+        let parts = fs::read_dir(evolver.folder()).unwrap().flatten();
+        let parts = parts.filter(|entry| entry.file_name().to_string_lossy().ends_with(".part"));
+        assert_eq!(parts.count(), 1, "{what}: only that of the user");
     }
 }
 
