@@ -701,6 +701,20 @@ fn a_decoder_shows_message_and_crc_from_the_last_byte_of_a_frame_to_the_next_byt
 }
 
 #[test]
+fn messages_that_go_the_other_way_are_told_as_such_by_both_ends() {
+    let payload = |wire: Vec<u8>| reference_decode(&wire[1..wire.len() - 1]).unwrap();
+    let sensors = SensorBits::new(1);
+    for body in [Request::Identify, Request::Step { sensors }, Request::Stop] {
+        let echo = payload(wire_of(&request(7, 2, body)));
+        assert_eq!(decode_reply(&echo), Err(MalformedMessage::WrongWay));
+    }
+    for body in [Reply::Done, Reply::Refused(Refusal::Running)] {
+        let echo = payload(wire_of(&reply(2, body)));
+        assert_eq!(decode_request(&echo), Err(MalformedMessage::WrongWay));
+    }
+}
+
+#[test]
 fn every_kind_of_fault_is_a_bit_of_its_own() {
     let kinds = [
         Faults::NO_GENOME,
