@@ -31,7 +31,7 @@ pub struct GalleryArgs {
 /// Writes a gallery.
 ///
 /// # Errors
-/// [`BadInput`] if there is nothing to show, or no place for it.
+/// [`BadInput`](super::BadInput) if there is nothing to show, or no place for it.
 pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
     let threads = match &arguments.threads {
         Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),

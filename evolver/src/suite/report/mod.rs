@@ -2,7 +2,7 @@
 //! tests.
 //!
 //! [`gather`] reads the finished runs and does what is made of them afterwards; [`tables`],
-//! [`figures`] and [`findings`] compute from that and from [`paper`]'s numbers; [`markdown`] and
+//! [`figures`] and [`findings`] compute from that and from [`paper`]'s numbers; [`mod@markdown`] and
 //! [`html`] only write it down.
 
 pub mod damage_areas;
