@@ -701,6 +701,18 @@ fn a_decoder_shows_message_and_crc_from_the_last_byte_of_a_frame_to_the_next_byt
 }
 
 #[test]
+fn a_chunk_longer_than_any_is_no_message_although_its_frame_is_whole() {
+    let data = &[1; CHUNK_BYTES_MAX + 10];
+    for length in [CHUNK_BYTES_MAX + 1, CHUNK_BYTES_MAX + 10] {
+        let data = &data[..length];
+        let wire = wire_of(&request(7, 2, Request::Chunk { offset: 0, data }));
+        let payload = reference_decode(&wire[1..wire.len() - 1]).unwrap();
+        let refused = decode_request(&payload);
+        assert_eq!(refused, Err(MalformedMessage::NotAMessage), "{length}");
+    }
+}
+
+#[test]
 fn messages_that_go_the_other_way_are_told_as_such_by_both_ends() {
     let payload = |wire: Vec<u8>| reference_decode(&wire[1..wire.len() - 1]).unwrap();
     let sensors = SensorBits::new(1);
