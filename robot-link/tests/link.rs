@@ -713,6 +713,19 @@ fn a_chunk_longer_than_any_is_no_message_although_its_frame_is_whole() {
 }
 
 #[test]
+fn request_0_is_to_identify_and_nothing_else() {
+    let (mut server, mut handler) = (Server::new(), Recorder::default());
+    for body in [Request::Stop, Request::Begin { length: 1, crc: 2 }] {
+        let wire = wire_of(&request(7, 0, body));
+        let payload = reference_decode(&wire[1..wire.len() - 1]).unwrap();
+        let refused = decode_request(&payload);
+        assert_eq!(refused, Err(MalformedMessage::NotAMessage), "{body:?}");
+        assert!(feed(&mut server, &mut handler, &wire).is_empty());
+    }
+    assert_eq!((handler.calls, server.counters().malformed), (0, 2));
+}
+
+#[test]
 fn messages_that_go_the_other_way_are_told_as_such_by_both_ends() {
     let payload = |wire: Vec<u8>| reference_decode(&wire[1..wire.len() - 1]).unwrap();
     let sensors = SensorBits::new(1);

@@ -10,8 +10,8 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, CRC_32C, Provenance, encode};
 use minimal_surprise_controller::{EncodedGenome, Genome, Topology};
 use minimal_surprise_slots::{
-    Buffer, COMMIT_AT, CONTAINER_AT, Defect, Header, InPlace, InUse, PlaceError, Slot, SlotState,
-    Slots, UpdateError, crc_of, slot_bytes,
+    BLOCK_BYTES, Buffer, COMMIT_AT, CONTAINER_AT, Defect, Header, InPlace, InUse, PlaceError, Slot,
+    SlotState, Slots, UpdateError, crc_of, slot_bytes,
 };
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
@@ -613,6 +613,9 @@ fn chunks_out_of_place_are_refused_and_the_update_goes_on() {
         let refused = slots.begin(found as u16, 0);
         assert_eq!(refused, Err(UpdateError::ImpossibleLength { found }));
     }
+    for longest_or_shortest in [CONTAINER_BYTES_MAX as u16, 1] {
+        assert_eq!(slots.begin(longest_or_shortest, 0), Ok(()));
+    }
     slots.begin(length, crc_of(&genome).unwrap()).unwrap();
     slots.chunk(0, &genome[..50]).unwrap();
     for found in [0, 49, 51] {
@@ -673,6 +676,31 @@ fn what_is_not_the_announced_genome_is_never_committed() {
         Err(UpdateError::Defect(Defect::Refused(_)))
     ));
     assert_eq!(slots.release().counts.erases, erases, "nothing was erased");
+}
+
+#[test]
+fn a_container_takes_a_write_a_block_and_none_that_is_empty() {
+    type Flash = MockFlash<4, 4096>;
+    let room = &mut Buffer::new();
+    let mut whole_blocks = 0;
+    for topology in Topology::ALL {
+        for bits in 0..64 {
+            let provenance = Provenance {
+                seed: Some(1 << bits),
+                matched_bits: 1 << bits,
+                ..Provenance::default()
+            };
+            let mut buffer = [0; CONTAINER_BYTES_MAX];
+            let genome = encode(&Genome::zeroed(topology), provenance, &mut buffer).unwrap();
+            whole_blocks += u32::from(genome.len().is_multiple_of(BLOCK_BYTES));
+            let mut slots = Slots::open(Flash::new(), Flash::OFFSET, room).unwrap();
+            assert_eq!(slots.write(genome, room), Ok(1));
+            let blocks = genome.len().div_ceil(BLOCK_BYTES) as u64;
+            // The header before them, the commit record behind.
+            assert_eq!(slots.release().counts.writes, 1 + blocks + 1);
+        }
+    }
+    assert!(whole_blocks > 0);
 }
 
 #[test]
