@@ -1,5 +1,5 @@
 #!/bin/sh
-# Mutation tests of controller, slots and link: scripts/mutants.sh [SHARDS]. Takes an hour or two,
+# Mutation tests of controller, slots and link: scripts/mutants.sh [SHARDS]. Takes about an hour,
 # and cargo-mutants (cargo install cargo-mutants --locked).
 #
 # The outcomes are in target/mutants. Started again, it goes on behind the last complete shard;
