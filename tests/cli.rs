@@ -401,6 +401,12 @@ fn only_an_unchanged_run_is_resumed() {
     let again = evolver.run(&resume("done"));
     assert_eq!(again.code, Some(0));
     assert!(again.stdout.contains(hash_of(&done)), "{again:?}");
+    for file in ["best.genome", "generations.csv", "final.json", "meta.json"] {
+        let whole = evolver.read(&format!("done/{file}"));
+        evolver.write(&format!("done/{file}"), &whole[..whole.len() / 2]);
+        evolver.run(&resume("done")).assert_failed(&["done", file]);
+        evolver.write(&format!("done/{file}"), &whole);
+    }
 
     let long = short(&["--seed", "1", "--generations", "100000", "--out", "cut"]);
     let running = evolver.start(&long);

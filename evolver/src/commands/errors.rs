@@ -112,13 +112,14 @@ impl AboutInput for SettingError {
     }
 }
 
-/// A run that is not complete was named too early; one that is, and cannot be read, is damaged.
+/// A run that is not complete was named too early; one that is, and cannot be read, is damaged,
+/// whatever file of it is in the way.
 impl AboutInput for ReadRunError {
     fn is_bad_input(&self) -> bool {
         match self {
             // Marked complete, it lacks something else.
             Self::NotComplete { missing, .. } => *missing == DONE,
-            Self::File(error) => error.is_bad_input(),
+            Self::File(error) => error.path.ends_with(DONE) && error.is_bad_input(),
             _ => false,
         }
     }
@@ -168,7 +169,12 @@ mod tests {
             let file = || FileError::at(Path::new("a file"))(kind.into());
             assert_eq!(exit_of(&unusable(file())), exit, "{kind}");
             assert_eq!(exit_of(&unusable(RunDirError::File(file()))), exit);
-            assert_eq!(exit_of(&unusable(ReadRunError::File(file()))), exit);
+            let of_run = |name: &str| {
+                let error = FileError::at(&Path::new("run").join(name))(kind.into());
+                exit_of(&unusable(ReadRunError::File(error)))
+            };
+            assert_eq!(of_run(DONE), exit);
+            assert_eq!(of_run("best.genome"), Exit::Failure);
             assert_eq!(exit_of(&unusable(GalleryError::File(file()))), exit);
             let about = unusable(file()).context("--out = a file");
             assert_eq!(exit_of(&about), exit, "{about:#}");

@@ -165,6 +165,8 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
         Some(directory) => match RunDir::open(directory).map_err(unusable)? {
             Found::Unfinished(experiment, run) => (*experiment, run),
             Found::Finished(hash) => {
+                // All of it, or a damaged one would be called complete.
+                FinishedRun::read_and_check(directory).map_err(unusable)?;
                 if arguments.progress == ProgressMode::Json {
                     let done = serde_json::json!({"event": "done", "hash": hash, "run": text_of_path(directory)});
                     show_line!("{done}");
