@@ -650,6 +650,18 @@ fn what_cannot_be_read_is_not_said_to_be_missing() {
         fs::create_dir(&path).unwrap();
         refused("replay run --svg a", &format!("run/{file}: Is a directory"));
         fs::remove_dir(&path).unwrap();
+        for wait_or_endless in ["pipe", "/dev/zero"] {
+            if wait_or_endless == "pipe" {
+                let made = std::process::Command::new("mkfifo").arg(&path).status();
+                assert!(made.unwrap().success());
+            } else {
+                std::os::unix::fs::symlink(wait_or_endless, &path).unwrap();
+            }
+            for line in ["replay run --svg a", "classify run", "gallery run --out g"] {
+                refused(line, &format!("run/{file}: not a plain file"));
+            }
+            fs::remove_file(&path).unwrap();
+        }
         std::os::unix::fs::symlink(file, &path).unwrap();
         refused(
             "replay run --svg a",

@@ -350,8 +350,15 @@ const FILES: [&str; 5] = [
 ];
 
 fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
-    if files::exists(&run.join(file))? {
-        return Ok(());
+    let path = run.join(file);
+    if files::exists(&path)? {
+        let kind = std::fs::metadata(&path).map_err(FileError::at(&path))?;
+        if kind.is_file() || kind.is_dir() {
+            return Ok(());
+        }
+        // A pipe would be waited for, and a device may have no end.
+        let error = std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a plain file");
+        return Err(FileError::at(&path)(error).into());
     }
     // Of a directory that is not there, no file is missing.
     std::fs::metadata(run).map_err(FileError::at(run))?;
@@ -378,6 +385,7 @@ pub fn complete(path: &Path) -> Result<Option<String>, ReadRunError> {
         return Ok(None);
     }
     let look = || {
+        require(path, DONE)?;
         FILES.into_iter().try_for_each(|file| require(path, file))?;
         let state = path.join("final.json");
         check_version(&state, &files::read(&state, FINAL_STATE_BYTES_MAX)?)?;
