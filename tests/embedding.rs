@@ -37,7 +37,7 @@ fn the_readmes_embedding_lines_build_outside_the_repository() {
         let (_, contents) = found.unwrap_or_else(|| panic!("no {name} in the README"));
         fs::write(robot.join(name), contents).unwrap();
     }
-    let genome = repository.join("tests/fixtures/genomes/b-predefined-line.genome");
+    let genome = repository.join("controller/tests/b-predefined-line.genome");
     fs::copy(genome, robot.join("best.genome")).unwrap();
     // The versions that the robot's firmware is tested with.
     let versions = repository.join("firmware-example/Cargo.lock");
