@@ -658,3 +658,35 @@ fn export_refuses_what_is_no_genome_and_where_it_does_not_fit() {
         &["of a run directory"],
     );
 }
+
+#[test]
+fn every_command_calls_a_damaged_run_damaged_and_a_folder_without_one_bad_input() {
+    let evolver = with_a_run(&[]);
+    fs::create_dir(evolver.folder().join("empty")).unwrap();
+    let commands = [
+        "inspect",
+        "evaluate --starts 1",
+        "classify",
+        "export --format rust",
+    ];
+    let expect = |code: i32, directory: &str, word: &str| {
+        for command in commands {
+            let mut words: Vec<&str> = command.split(' ').collect();
+            words.insert(1, directory);
+            let run = evolver.run(&words);
+            assert_eq!(run.code, Some(code), "{words:?}: {run:?}");
+            assert!(run.stderr.contains(word), "no {word:?}: {run:?}");
+        }
+    };
+    expect(2, "empty", "it has no DONE");
+    let good = evolver.read("run/best.genome");
+    evolver.write("run/best.genome", &good[..good.len() / 2]);
+    expect(1, "run", "best.genome");
+    fs::remove_file(evolver.folder().join("run/best.genome")).unwrap();
+    expect(1, "run", "best.genome");
+    evolver.write("run/best.genome", &good);
+    let config = evolver.text("run/config.toml");
+    evolver.write("run/config.toml", &config.as_bytes()[..40]);
+    let run = evolver.run(&["evaluate", "run"]);
+    assert_eq!(run.code, Some(1), "{run:?}");
+}

@@ -251,6 +251,15 @@ fn what_this_machine_cannot_hold_is_refused_before_anything_is_written() {
             assert!(refused.stderr.contains(word), "{arguments}: {refused:?}");
         }
     }
+    // Not even the bits of one run could be counted; a replay has no population.
+    let endless =
+        "replay run/best.genome --grid 16384x16384 --robots 268435456 --steps 4294967295 --svg a";
+    let refused = evolver.run(&words(endless));
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(
+        refused.stderr.contains("--robots = 268435456: "),
+        "{refused:?}"
+    );
     for arguments in [
         "suite large.toml run --out new",
         "run-task --suite large.toml --shard 0/2 --out new",

@@ -155,6 +155,7 @@ fn a_name_that_cannot_be_read_or_typed_is_refused_before_anything_is_written() {
         "a\u{202e}b",
         "a\u{200b}b",
         "\u{feff}",
+        "\u{2800}",
     ] {
         for text in [suite(name, &["one"]), suite("own", &[name])] {
             evolver.write("own.toml", text.as_bytes());

@@ -1,7 +1,7 @@
 //! Reading a complete run directory back: the genome, where it started from, where it ended.
 
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
-use crate::limits::{self, FINAL_STATE_BYTES_MAX};
+use crate::limits;
 use crate::ranges;
 use crate::settings::{Given, SettingError, Settings};
 use crate::steps_hash::{RecordedHash, StepsHash, Version};
@@ -349,7 +349,8 @@ const FILES: [&str; 5] = [
     "generations.csv",
 ];
 
-fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
+/// A file of a run directory is there and can be read to an end.
+pub(crate) fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
     let path = run.join(file);
     if files::exists(&path)? {
         let kind = std::fs::metadata(&path).map_err(FileError::at(&path))?;
@@ -366,6 +367,28 @@ fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
         path: run.to_owned(),
         missing: file,
     })
+}
+
+/// The settings in a run directory. The first population is past, so the ancestor is not looked for.
+///
+/// # Errors
+/// [`ReadRunError`] if one is missing or wrong.
+pub fn settings_of_run(run: &Path) -> Result<Settings, ReadRunError> {
+    let config = run.join("config.toml");
+    let mut given = Given::default();
+    given.file(&config)?;
+    if let Some(missing) = given.missing() {
+        return Err(ReadRunError::Value {
+            path: config,
+            problem: format!("no {missing}, which every run records"),
+        });
+    }
+    given.forget("from");
+    Ok(Settings::resolve(&given, || 0)?)
+}
+
+fn read_final_state(path: &Path, settings: &Settings) -> Result<Vec<u8>, FileError> {
+    files::read(path, limits::most(limits::final_state_bytes(settings)))
 }
 
 fn recorded_hash(run: &Path) -> Result<String, ReadRunError> {
@@ -388,7 +411,8 @@ pub fn complete(path: &Path) -> Result<Option<String>, ReadRunError> {
         require(path, DONE)?;
         FILES.into_iter().try_for_each(|file| require(path, file))?;
         let state = path.join("final.json");
-        check_version(&state, &files::read(&state, FINAL_STATE_BYTES_MAX)?)?;
+        let bytes = read_final_state(&state, &settings_of_run(path)?)?;
+        check_version(&state, &bytes)?;
         recorded_hash(path)
     };
     look().map(Some).map_err(|error| ReadRunError::Damaged {
@@ -451,17 +475,7 @@ impl FinishedRun {
     pub fn read(path: &Path) -> Result<Self, ReadRunError> {
         require(path, DONE)?;
         FILES.into_iter().try_for_each(|file| require(path, file))?;
-        let mut given = Given::default();
-        let config = path.join("config.toml");
-        given.file(&config)?;
-        if let Some(missing) = given.missing() {
-            return Err(ReadRunError::Value {
-                path: config,
-                problem: format!("no {missing}, which every run records"),
-            });
-        }
-        given.forget("from");
-        let settings = Settings::resolve(&given, || 0)?;
+        let settings = settings_of_run(path)?;
         let genome_path = path.join("best.genome");
         let bytes = files::read(&genome_path, CONTAINER_BYTES_MAX as u64)?;
         let encoded = EncodedGenome::decode(&bytes).map_err(|error| ReadRunError::Genome {
@@ -469,10 +483,7 @@ impl FinishedRun {
             error,
         })?;
         let state_path = path.join("final.json");
-        let state = parse_final_state(
-            &state_path,
-            &files::read(&state_path, FINAL_STATE_BYTES_MAX)?,
-        )?;
+        let state = parse_final_state(&state_path, &read_final_state(&state_path, &settings)?)?;
         let inconsistent = |problem| {
             Err(ReadRunError::Inconsistent {
                 path: path.to_owned(),

@@ -409,9 +409,6 @@ pub fn table_bytes(settings: &Settings) -> f64 {
     f64::from(settings.generations) * 140.0
 }
 
-/// Most bytes of a `final.json`: a swarm on every cell of the largest grid, or 350 million steps.
-pub const FINAL_STATE_BYTES_MAX: u64 = 16 << 30;
-
 /// Bytes of `final.json`.
 #[must_use]
 pub fn final_state_bytes(settings: &Settings) -> f64 {

@@ -305,9 +305,11 @@ impl Settings {
         if matches_max.checked_mul(population.into()).is_none() {
             let problem = format!(
                 "{robots} robots and {steps} steps: the matches of a generation would not fit 64 \
-                 bits; lower one of the three"
+                 bits; lower one of them or the population"
             );
-            return Err(given.invalid("population", problem));
+            let keys = ["population", "robots", "steps"];
+            let named = keys.into_iter().find(|key| given.place(key).is_some());
+            return Err(given.invalid(named.unwrap_or(keys[0]), problem));
         }
         let generations = given.value("generations", 100, |text| count(text, COUNT_MAX))?;
         let repetitions = given.value("repetitions", 10, |text| count(text, COUNT_MAX))?;

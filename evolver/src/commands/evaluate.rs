@@ -1,15 +1,15 @@
 //! `evolver evaluate`: a genome from new starts, under the conditions it evolved in or others.
 
 use super::errors::unusable;
-use super::{BadInput, genome_file, thread_pool};
+use super::{BadInput, genome_file, read_genome, thread_pool};
 use crate::files;
+use crate::finished_run::settings_of_run;
 use crate::limits::{self, Needs};
 use crate::reevaluation::rerun;
 use crate::report::reevaluation::{Condition, conditions_json, conditions_text};
-use crate::settings::{Given, Settings, count, parse_grid, probability};
+use crate::settings::{Settings, count, parse_grid, probability};
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
-use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_sim::{NoiseRate, Scenario, SeedTree};
 use std::path::{Path, PathBuf};
 
@@ -56,8 +56,7 @@ pub struct EvaluateArgs {
 /// [`BadInput`] names the flag, the value and what would be valid.
 pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     let file = genome_file(&arguments.genome);
-    let path = file.display();
-    let bytes = files::read(&file, CONTAINER_BYTES_MAX as u64).map_err(unusable)?;
+    let bytes = read_genome(&arguments.genome)?;
     let run = conditions_beside(&file)?;
     let or_of_run = |given: &Option<String>, of_run: fn(&Settings) -> String, default: &str| {
         let of_run = || run.as_ref().map(of_run);
@@ -74,8 +73,7 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
         "100",
     );
     let steps = or_of_run(&arguments.steps, |run| run.written.steps.to_string(), "500");
-    let encoded =
-        EncodedGenome::decode(&bytes).map_err(|error| BadInput::new(format!("{path}: {error}")))?;
+    let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
     let starts = flag("starts", &arguments.starts, |text| count(text, 1_000_000))?;
     let steps = flag("steps", &steps, |text| count(text, u32::MAX))?;
     let grids = list("grid", &grid, parse_grid)?;
@@ -122,7 +120,8 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
         show_line!("{}", conditions_json(&conditions, seed));
     } else {
         show_line!(
-            "{path}: {starts} new starts of {steps} steps each, seed {seed}\n\n{}",
+            "{}: {starts} new starts of {steps} steps each, seed {seed}\n\n{}",
+            file.display(),
             conditions_text(&conditions)
         );
     }
@@ -135,10 +134,7 @@ fn conditions_beside(genome: &Path) -> anyhow::Result<Option<Settings>> {
     if !files::exists(&config).map_err(unusable)? {
         return Ok(None);
     }
-    let mut given = Given::default();
-    given.file(&config).map_err(unusable)?;
-    given.forget("from");
-    Settings::resolve(&given, || 0).map(Some).map_err(unusable)
+    Ok(Some(settings_of_run(files::parent(genome))?))
 }
 
 /// A flag's value, or an error that names the flag.

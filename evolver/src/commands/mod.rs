@@ -23,6 +23,7 @@ pub mod suite;
 pub use errors::{BadInput, Interrupted, exit_of};
 
 use crate::files;
+use crate::finished_run::{DONE, require};
 use errors::unusable;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
@@ -50,6 +51,12 @@ fn genome_file(path: &Path) -> PathBuf {
 /// this program.
 fn read_genome(path: &Path) -> anyhow::Result<Vec<u8>> {
     let file = &genome_file(path);
+    if path.is_dir() {
+        // Without its mark the run is not complete; marked, it is damaged.
+        require(path, "best.genome")
+            .or_else(|error| require(path, DONE).and(Err(error)))
+            .map_err(unusable)?;
+    }
     let bytes = files::read(file, CONTAINER_BYTES_MAX as u64).map_err(unusable)?;
     if let Err(error) = EncodedGenome::decode(&bytes) {
         let message = format!("{}: {error}", file.display());

@@ -1,6 +1,7 @@
 //! One serial port, and one question after another over it.
 
 use super::error::{Doing, Heard, OtherReader, Problem, RobotError};
+use crate::text::terminal;
 use minimal_surprise_link::{Client, MalformedMessage, Refusal, Reply, Request};
 use serialport::SerialPort;
 use std::fmt;
@@ -24,7 +25,7 @@ pub struct PortName(pub String);
 
 impl fmt::Display for PortName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
+        f.write_str(&terminal(&self.0))
     }
 }
 
