@@ -316,6 +316,10 @@ fn no_reader_takes_more_than_what_it_reads_can_be() {
         "evaluate large",
         "replay large",
         "classify large",
+        "evolve large",
+        "evolve --from large",
+        "suite large plan",
+        "import --action large",
     ] {
         let refused = within(&evolver, 900_000, &words(command));
         assert_eq!(refused.code, Some(2), "{command}: {refused:?}");
@@ -327,6 +331,10 @@ fn no_reader_takes_more_than_what_it_reads_can_be() {
         "inspect /dev/zero",
         "replay /dev/zero",
         "classify /dev/zero",
+        "evolve /dev/zero",
+        "evolve --from /dev/zero",
+        "suite /dev/zero plan",
+        "import --action /dev/zero",
     ] {
         let refused = within(&evolver, 900_000, &words(command));
         assert_eq!(refused.code, Some(2), "{command}: {refused:?}");

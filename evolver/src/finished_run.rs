@@ -3,6 +3,7 @@
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::limits;
 use crate::ranges;
+use crate::run_files::{BEST, CONFIG, DONE, FINAL, GENERATIONS, META, OF_COMPLETE};
 use crate::settings::{Given, SettingError, Settings};
 use crate::steps_hash::{RecordedHash, StepsHash, Version};
 use crate::time_spent::TimeSpent;
@@ -337,18 +338,6 @@ fn best_fitness(path: &Path, most: u64) -> Result<Vec<f64>, ReadRunError> {
     Ok(values)
 }
 
-/// Marks a run as complete, and holds its hash.
-pub(crate) const DONE: &str = "DONE";
-
-/// The other files of a complete run that it cannot be read back without.
-const FILES: [&str; 5] = [
-    "config.toml",
-    "meta.json",
-    "best.genome",
-    "final.json",
-    "generations.csv",
-];
-
 /// A file of a run directory is there and can be read to an end.
 pub(crate) fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
     let path = run.join(file);
@@ -374,9 +363,15 @@ pub(crate) fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError
 /// # Errors
 /// [`ReadRunError`] if one is missing or wrong.
 pub fn settings_of_run(run: &Path) -> Result<Settings, ReadRunError> {
-    let config = run.join("config.toml");
+    settings_and_text_of_run(run).map(|(settings, _)| settings)
+}
+
+/// The same with their text, its lines ending with `\n` whatever an editor made of them.
+pub(crate) fn settings_and_text_of_run(run: &Path) -> Result<(Settings, String), ReadRunError> {
+    let config = run.join(CONFIG);
+    let text = files::read_text(&config, TEXT_BYTES_MAX)?;
     let mut given = Given::default();
-    given.file(&config)?;
+    given.text(&config, &text)?;
     if let Some(missing) = given.missing() {
         return Err(ReadRunError::Value {
             path: config,
@@ -384,7 +379,7 @@ pub fn settings_of_run(run: &Path) -> Result<Settings, ReadRunError> {
         });
     }
     given.forget("from");
-    Ok(Settings::resolve(&given, || 0)?)
+    Ok((Settings::resolve(&given, || 0)?, text))
 }
 
 fn read_final_state(path: &Path, settings: &Settings) -> Result<Vec<u8>, FileError> {
@@ -398,6 +393,17 @@ fn recorded_hash(run: &Path) -> Result<String, ReadRunError> {
         .map_err(|problem| ReadRunError::Value { path, problem })
 }
 
+/// How far a run is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Nothing is there.
+    Pending,
+    /// It has begun.
+    Begun,
+    /// It is complete.
+    Done,
+}
+
 /// The hash of a run, if it is complete, by a quick look at its directory.
 ///
 /// # Errors
@@ -409,8 +415,10 @@ pub fn complete(path: &Path) -> Result<Option<String>, ReadRunError> {
     }
     let look = || {
         require(path, DONE)?;
-        FILES.into_iter().try_for_each(|file| require(path, file))?;
-        let state = path.join("final.json");
+        OF_COMPLETE
+            .into_iter()
+            .try_for_each(|file| require(path, file))?;
+        let state = path.join(FINAL);
         let bytes = read_final_state(&state, &settings_of_run(path)?)?;
         check_version(&state, &bytes)?;
         recorded_hash(path)
@@ -443,7 +451,7 @@ impl FinishedRun {
                 ends.copy_from_slice(world.poses());
             })
             .map_err(|error| StateError::Poses {
-                path: path.join("final.json"),
+                path: path.join(FINAL),
                 error,
             })?;
         let other_steps = recorded.is_some_and(|recorded| recorded.hash != hash.to_string());
@@ -474,15 +482,17 @@ impl FinishedRun {
     /// [`ReadRunError`] if the run is not complete, or a file in it is wrong.
     pub fn read(path: &Path) -> Result<Self, ReadRunError> {
         require(path, DONE)?;
-        FILES.into_iter().try_for_each(|file| require(path, file))?;
+        OF_COMPLETE
+            .into_iter()
+            .try_for_each(|file| require(path, file))?;
         let settings = settings_of_run(path)?;
-        let genome_path = path.join("best.genome");
+        let genome_path = path.join(BEST);
         let bytes = files::read(&genome_path, CONTAINER_BYTES_MAX as u64)?;
         let encoded = EncodedGenome::decode(&bytes).map_err(|error| ReadRunError::Genome {
             path: genome_path,
             error,
         })?;
-        let state_path = path.join("final.json");
+        let state_path = path.join(FINAL);
         let state = parse_final_state(&state_path, &read_final_state(&state_path, &settings)?)?;
         let inconsistent = |problem| {
             Err(ReadRunError::Inconsistent {
@@ -513,7 +523,7 @@ impl FinishedRun {
             return inconsistent("final.json has another hash than DONE");
         }
         let table_bytes = limits::most(limits::table_bytes(&settings));
-        let best_fitness = best_fitness(&path.join("generations.csv"), table_bytes)?;
+        let best_fitness = best_fitness(&path.join(GENERATIONS), table_bytes)?;
         if best_fitness.len() != settings.generations as usize {
             return inconsistent(
                 "generations.csv has another number of lines than config.toml has generations",
@@ -526,7 +536,7 @@ impl FinishedRun {
         if provenance.matched_bits > provenance.scored_bits {
             return inconsistent("best.genome has more matched bits than scored ones");
         }
-        let meta_path = path.join("meta.json");
+        let meta_path = path.join(META);
         let meta = serde_json::from_slice(&files::read(&meta_path, TEXT_BYTES_MAX)?);
         let meta: MetaFile = meta.map_err(|error| ReadRunError::Json {
             path: meta_path,

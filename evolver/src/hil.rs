@@ -5,6 +5,7 @@
 //! prediction in 16 bits, and its pose afterwards; and at the end robot 0's mispredicted and seen
 //! bits in 64 bits each. A pose is x and y in 16 bits each and the heading in 8. All little-endian.
 
+use crate::text::hex;
 use minimal_surprise_controller::{Controller, Decision, SensorBits, State, Surprise};
 use minimal_surprise_link::Stepped;
 use minimal_surprise_sim::{Pose, Scenario, Trial, World, WorldError};
@@ -42,10 +43,7 @@ pub struct HilHash([u8; 32]);
 
 impl fmt::Display for HilHash {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for byte in self.0 {
-            write!(f, "{byte:02x}")?;
-        }
-        Ok(())
+        f.write_str(&hex(&self.0))
     }
 }
 

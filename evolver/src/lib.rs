@@ -30,6 +30,7 @@ pub mod replay;
 pub mod report;
 pub mod robot;
 pub mod run_dir;
+mod run_files;
 pub mod run_hash;
 pub mod settings;
 pub mod signals;

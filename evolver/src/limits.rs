@@ -6,6 +6,7 @@
 
 use crate::experiment::GenerationRecord;
 use crate::files::TEXT_BYTES_MAX;
+use crate::run_files::{FINAL, GENERATIONS};
 use crate::settings::Settings;
 use indicatif::DecimalBytes;
 use minimal_surprise_controller::{Decision, Genome, SensorBits, State};
@@ -154,12 +155,12 @@ impl Needs {
                 ),
                 part(
                     2.0 * table_bytes(settings),
-                    "generations.csv",
+                    GENERATIONS,
                     [("generations", settings.generations)],
                 ),
                 part(
                     final_state_bytes(settings),
-                    "final.json",
+                    FINAL,
                     [("steps", scenario.steps()), ("robots", scenario.robots())],
                 ),
             ],

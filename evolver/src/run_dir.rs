@@ -15,14 +15,14 @@
 
 use crate::checkpoint::{self, CheckpointError};
 use crate::experiment::{Experiment, Finding};
-use crate::files::{self, FileError, TEXT_BYTES_MAX};
-use crate::finished_run::{DONE, ReadRunError, complete};
+use crate::files::{self, FileError};
+use crate::finished_run::{ReadRunError, complete, settings_and_text_of_run};
 use crate::limits::{self, Needs, TooMuch};
 use crate::lock::{self, Holder, LOCK, Lock, LockError};
 use crate::new_dir::NewDir;
 use crate::report::tables;
-use crate::settings::{Given, SettingError, Settings};
-use crate::time_spent::{TIME, TimeSpent, Timer};
+use crate::run_files::{BEST, CHECKPOINT, CONFIG, DONE, FINAL, GENERATIONS, META, TIME};
+use crate::time_spent::{TimeSpent, Timer};
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
 use minimal_surprise_sim::engine::PathError;
 use std::fs;
@@ -80,9 +80,6 @@ pub enum RunDirError {
     /// A file cannot be used.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The settings in it are wrong.
-    #[error(transparent)]
-    Settings(#[from] SettingError),
     /// The environment asks for a path of the engine that there is not.
     #[error(transparent)]
     EnginePath(#[from] PathError),
@@ -109,13 +106,6 @@ impl RunDirError {
         }
     }
 }
-
-const CHECKPOINT: &str = "checkpoint";
-const CONFIG: &str = "config.toml";
-const META: &str = "meta.json";
-const GENERATIONS: &str = "generations.csv";
-const BEST: &str = "best.genome";
-const FINAL: &str = "final.json";
 
 /// What `--resume` finds.
 #[derive(Debug)]
@@ -289,20 +279,14 @@ impl RunDir {
 
 /// What a run that is not complete goes on from.
 fn unfinished(path: &Path) -> Result<(Experiment, String, TimeSpent), RunDirError> {
-    let (config, checkpoint) = (path.join(CONFIG), path.join(CHECKPOINT));
+    let checkpoint = path.join(CHECKPOINT);
     if !files::exists(&checkpoint)? {
         return Err(RunDirError::NotARun {
             path: path.to_owned(),
             missing: CHECKPOINT,
         });
     }
-    // Editors may change line ends; the checkpoint has the text as it was written.
-    let text = files::read_text(&config, TEXT_BYTES_MAX).map_err(ReadRunError::from)?;
-    let mut given = Given::default();
-    given.text(&config, &text)?;
-    // The first population is in the checkpoint; its ancestor need not exist any more.
-    given.forget("from");
-    let settings = Settings::resolve(&given, || 0)?;
+    let (settings, text) = settings_and_text_of_run(path)?;
     Needs::of_evolution(&settings, limits::threads(None)).check_memory()?;
     let most = limits::most(limits::checkpoint_bytes(&settings));
     let bytes = files::read(&checkpoint, most).map_err(ReadRunError::from)?;

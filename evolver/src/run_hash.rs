@@ -6,6 +6,7 @@
 //! is x and y in 16 bits each and the heading in 8; all little-endian. No version, time, path,
 //! thread count or engine enters it.
 
+use crate::text::hex;
 use minimal_surprise_controller::Genome;
 use minimal_surprise_sim::Pose;
 use serde::{Deserialize, Serialize};
@@ -55,9 +56,6 @@ impl RunHash {
 
 impl std::fmt::Display for RunHash {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        for byte in self.0 {
-            write!(f, "{byte:02x}")?;
-        }
-        Ok(())
+        f.write_str(&hex(&self.0))
     }
 }

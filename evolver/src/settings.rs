@@ -5,6 +5,7 @@
 
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::text::path_of_text;
+use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_controller::{
     DecodeError, EncodedGenome, Genome, MutationRate, Prediction, SensorModel, Template, Topology,
 };
@@ -35,6 +36,9 @@ pub const KEYS: [&str; 15] = [
 
 /// Most generations of a run, genomes of a population and repetitions of an evaluation.
 const COUNT_MAX: u32 = 1_000_000;
+
+/// Most threads of a command.
+const THREADS_MAX: u32 = 1024;
 
 /// Where a setting was given.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -391,7 +395,7 @@ impl Settings {
 /// # Errors
 /// [`SettingError`] unless it is a whole number from 1.
 pub fn threads(given: &Given) -> Result<Option<u32>, SettingError> {
-    given.value("threads", None, |text| count(text, 1024).map(Some))
+    given.value("threads", None, |text| thread_count(text).map(Some))
 }
 
 /// The run directory, if one was given.
@@ -442,6 +446,14 @@ pub fn count(text: &str, most: u32) -> Result<u32, String> {
         Ok(value) if (1..=most).contains(&value) => Ok(value),
         _ => Err(format!("expected a whole number from 1 to {most}")),
     }
+}
+
+/// A number of threads.
+///
+/// # Errors
+/// What would be valid.
+pub fn thread_count(text: &str) -> Result<u32, String> {
+    count(text, THREADS_MAX)
 }
 
 /// A grid written as `15x15`.
@@ -527,7 +539,7 @@ pub fn resolve_topology(given: &Given) -> Result<Topology, SettingError> {
 
 /// A genome file for a topology.
 fn read_genome_for(path: &Path, topology: Topology) -> Result<Genome, String> {
-    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
+    let bytes = files::read(path, CONTAINER_BYTES_MAX as u64).map_err(|e| e.error.to_string())?;
     let encoded = EncodedGenome::decode(&bytes).map_err(|error: DecodeError| error.to_string())?;
     if encoded.topology() == topology {
         Ok(encoded.to_genome())

@@ -9,6 +9,7 @@
 //! Under version 1 a reading also has the bits beyond the model's sensors that noise draws. Without
 //! noise both versions give the same hash.
 
+use crate::text::hex;
 use minimal_surprise_controller::SensorModel;
 use minimal_surprise_sim::noise::NoiseStream;
 use minimal_surprise_sim::{Pose, Trial, World};
@@ -81,9 +82,7 @@ impl StepsHash {
 
 impl fmt::Display for StepsHash {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.chain
-            .iter()
-            .try_for_each(|byte| write!(f, "{byte:02x}"))
+        f.write_str(&hex(&self.chain))
     }
 }
 

@@ -97,7 +97,9 @@ fn is_device(name: &str) -> bool {
     DEVICES.contains(&stem.trim_end_matches(|c: char| c.is_ascii_digit()))
 }
 
-fn hex(bytes: &[u8]) -> String {
+/// Bytes as hexadecimal digits, two each.
+#[must_use]
+pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

@@ -5,13 +5,11 @@
 
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::ranges;
+use crate::run_files::TIME;
 use crate::usage::Stopwatch;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
-
-/// Its file in a run directory.
-pub const TIME: &str = "time.json";
 
 /// `time.json`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

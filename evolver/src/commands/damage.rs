@@ -1,8 +1,7 @@
 //! `evolver damage`: take a part of a structure away, or scatter it, and see what the swarm does.
 
 use super::errors::unusable;
-use super::evaluate::flag;
-use super::{BadInput, thread_pool};
+use super::{BadInput, flag, thread_pool, threads_flag};
 use crate::finished_run::FinishedRun;
 use crate::limits::{self, Needs};
 use crate::reevaluation::resilience;
@@ -68,10 +67,7 @@ pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
         Damage::Reposition(area)
     };
     let repeat = flag("repeat", &arguments.repeat, |text| count(text, 1_000_000))?;
-    let threads = match &arguments.threads {
-        Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
-        None => None,
-    };
+    let threads = threads_flag(&arguments.threads)?;
     let structure = match &arguments.structure {
         Some(text) => flag("structure", text, structure_named)?,
         None => {

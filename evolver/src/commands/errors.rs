@@ -3,10 +3,11 @@
 use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
 use crate::files::FileError;
-use crate::finished_run::{DONE, ReadRunError};
+use crate::finished_run::ReadRunError;
 use crate::output;
 use crate::replay::gallery::GalleryError;
 use crate::run_dir::RunDirError;
+use crate::run_files::DONE;
 use crate::settings::SettingError;
 use crate::text::shell_path;
 
@@ -132,7 +133,7 @@ impl AboutInput for RunDirError {
             Self::EnginePath(_) | Self::TooMuch(_) => true,
             Self::NotThere(error) | Self::File(error) => error.is_bad_input(),
             Self::Damaged(error) => error.is_bad_input(),
-            Self::InUse { .. } | Self::Settings(_) | Self::Checkpoint { .. } => false,
+            Self::InUse { .. } | Self::Checkpoint { .. } => false,
         }
     }
 }

@@ -1,12 +1,13 @@
 //! `evolver evaluate`: a genome from new starts, under the conditions it evolved in or others.
 
 use super::errors::unusable;
-use super::{BadInput, genome_file, read_genome, thread_pool};
+use super::{BadInput, flag, genome_file, read_genome, thread_pool, threads_flag};
 use crate::files;
 use crate::finished_run::settings_of_run;
 use crate::limits::{self, Needs};
 use crate::reevaluation::rerun;
 use crate::report::reevaluation::{Condition, conditions_json, conditions_text};
+use crate::run_files::CONFIG;
 use crate::settings::{Settings, count, parse_grid, probability};
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
@@ -79,10 +80,7 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     let grids = list("grid", &grid, parse_grid)?;
     let noises = list("noise", &noise, probability)?;
     let swarms = list("robots", &robots, |text| count(text, u32::MAX))?;
-    let threads = match &arguments.threads {
-        Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
-        None => None,
-    };
+    let threads = threads_flag(&arguments.threads)?;
     let seed = match &arguments.seed {
         Some(text) => flag("seed", text, crate::settings::seed)?,
         None => encoded.provenance().seed.unwrap_or(0),
@@ -130,20 +128,11 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
 
 /// The settings of the run that the genome came out of, if it lies in a run directory.
 fn conditions_beside(genome: &Path) -> anyhow::Result<Option<Settings>> {
-    let config = genome.with_file_name("config.toml");
+    let config = genome.with_file_name(CONFIG);
     if !files::exists(&config).map_err(unusable)? {
         return Ok(None);
     }
     Ok(Some(settings_of_run(files::parent(genome))?))
-}
-
-/// A flag's value, or an error that names the flag.
-pub(super) fn flag<T>(
-    name: &str,
-    text: &str,
-    parse: impl Fn(&str) -> Result<T, String>,
-) -> Result<T, BadInput> {
-    parse(text).map_err(|problem| BadInput::new(format!("--{name} = {text}: {problem}")))
 }
 
 /// Values between commas.

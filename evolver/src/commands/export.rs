@@ -1,9 +1,8 @@
 //! `evolver export`: runs and genomes in the formats of other programs.
 
 use super::errors::unusable;
-use super::evaluate::flag;
 use super::replay::write_file;
-use super::{BadInput, genome_file, read_genome};
+use super::{BadInput, flag, genome_file, read_genome};
 use crate::files::Existing;
 use crate::finished_run::FinishedRun;
 use crate::limits::Needs;

@@ -1,12 +1,10 @@
 //! `evolver gallery`: all runs at a glance, each a step from its replay.
 
 use super::errors::{name_damaged, unusable};
-use super::evaluate::flag;
-use super::thread_pool;
+use super::{thread_pool, threads_flag};
 use crate::exit::Exit;
 use crate::files::Existing;
 use crate::replay::gallery::write;
-use crate::settings::count;
 use crate::text::terminal_path;
 use clap::Args;
 use std::path::PathBuf;
@@ -33,10 +31,7 @@ pub struct GalleryArgs {
 /// # Errors
 /// [`BadInput`](super::BadInput) if there is nothing to show, or no place for it.
 pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
-    let threads = match &arguments.threads {
-        Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
-        None => None,
-    };
+    let threads = threads_flag(&arguments.threads)?;
     let existing = Existing::with_overwrite(arguments.overwrite);
     let written = thread_pool(threads)?
         .install(|| write(&arguments.directories, &arguments.out, existing))

@@ -10,6 +10,7 @@ use crate::hil::{Course, HilError, Ran};
 use crate::limits::Needs;
 use crate::report::progress;
 use crate::robot::{Afterwards, Robot, RobotError, describe, is_in_use};
+use crate::run_files::BEST;
 use crate::text::shell_path;
 use clap::Args;
 use indicatif::ProgressBar;
@@ -96,7 +97,7 @@ fn of_run(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
         scenario: finished.settings.scenario,
         trial: finished.trial(),
     };
-    Ok((course, directory.join("best.genome")))
+    Ok((course, directory.join(BEST)))
 }
 
 /// The run that the flags ask for: the first trial of their seed.

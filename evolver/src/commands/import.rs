@@ -1,8 +1,7 @@
 //! `evolver import`: genome containers of the genome text of the authors' program.
 
-use super::BadInput;
 use super::errors::unusable;
-use super::evaluate::flag;
+use super::{BadInput, flag};
 use crate::files::{self, DATA_BYTES_MAX, FileError};
 use crate::new_dir::{NewDir, remove_abandoned};
 use crate::settings::{Given, describe, resolve_topology};

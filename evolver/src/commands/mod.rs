@@ -23,7 +23,9 @@ pub mod suite;
 pub use errors::{BadInput, Interrupted, exit_of};
 
 use crate::files;
-use crate::finished_run::{DONE, require};
+use crate::finished_run::require;
+use crate::run_files::{BEST, DONE};
+use crate::settings::thread_count;
 use errors::unusable;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
@@ -38,10 +40,27 @@ pub fn thread_pool(threads: Option<u32>) -> Result<rayon::ThreadPool, rayon::Thr
     rayon::ThreadPoolBuilder::new().num_threads(threads).build()
 }
 
+/// A flag's value, or an error that names the flag.
+fn flag<T>(
+    name: &str,
+    text: &str,
+    parse: impl Fn(&str) -> Result<T, String>,
+) -> Result<T, BadInput> {
+    parse(text).map_err(|problem| BadInput::new(format!("--{name} = {text}: {problem}")))
+}
+
+/// The value of `--threads`, if it was given.
+fn threads_flag(given: &Option<String>) -> Result<Option<u32>, BadInput> {
+    let given = given.as_deref();
+    given
+        .map(|text| flag("threads", text, thread_count))
+        .transpose()
+}
+
 /// The genome file that a path names: of a run directory, its best genome.
 fn genome_file(path: &Path) -> PathBuf {
     if path.is_dir() {
-        path.join("best.genome")
+        path.join(BEST)
     } else {
         path.to_owned()
     }
@@ -53,7 +72,7 @@ fn read_genome(path: &Path) -> anyhow::Result<Vec<u8>> {
     let file = &genome_file(path);
     if path.is_dir() {
         // Without its mark the run is not complete; marked, it is damaged.
-        require(path, "best.genome")
+        require(path, BEST)
             .or_else(|error| require(path, DONE).and(Err(error)))
             .map_err(unusable)?;
     }

@@ -1,6 +1,6 @@
 //! `evolver monitor`: what a robot does, live.
 
-use super::evaluate::flag;
+use super::flag;
 use super::port::{PortArgs, failed};
 use crate::exit::Exit;
 use crate::output;

@@ -1,8 +1,7 @@
 //! `evolver replay` into files: stills and animations.
 
-use super::BadInput;
-use super::evaluate::flag;
 use super::replay::{refuse_existing, write_file};
+use super::{BadInput, flag};
 use crate::files::Existing;
 use crate::replay::palette::{DARK, LIGHT, Theme};
 use crate::replay::pictures::film::Film;

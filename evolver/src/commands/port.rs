@@ -1,7 +1,6 @@
 //! The robot on a serial port, as commands use it.
 
-use super::evaluate::flag;
-use super::{BadInput, Interrupted};
+use super::{BadInput, Interrupted, flag};
 use crate::exit::Exit;
 use crate::report::summary::program;
 use crate::robot::{PortName, Problem, Robot, RobotError, standing};

@@ -3,9 +3,8 @@
 use super::conditions::GenomeConditions;
 use super::damage::corners;
 use super::errors::unusable;
-use super::evaluate::flag;
 use super::pictures::PictureArgs;
-use super::{BadInput, read_genome};
+use super::{BadInput, flag, read_genome};
 use crate::files::{self, DATA_BYTES_MAX, Existing};
 use crate::finished_run::FinishedRun;
 use crate::limits::Needs;

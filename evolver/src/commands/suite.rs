@@ -1,11 +1,11 @@
 //! `evolver paper` and `evolver suite FILE`: many evolutions, on one machine or many.
 
 use super::errors::{Unfinished, name_damaged, stopped};
-use super::evaluate::flag;
-use super::{BadInput, thread_pool};
+use super::{BadInput, flag, thread_pool, threads_flag};
 use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
 use crate::files::{self, Existing, TEXT_BYTES_MAX};
+use crate::finished_run::Progress;
 use crate::limits::{self, Needs};
 use crate::new_dir::remove_abandoned;
 use crate::replay::gallery;
@@ -17,9 +17,9 @@ use crate::signals::stop_on_signal;
 use crate::suite::plan::{Plan, PlannedRun, RUNS, Runs};
 use crate::suite::report;
 use crate::suite::search::{Search, look};
-use crate::suite::work::{Progress, Shard, Waiting, Worked, progress, work_on};
+use crate::suite::work::{Shard, Waiting, Worked, progress, work_on};
 use crate::suite::{PAPER, Resilience, Suite, slurm};
-use crate::text::{file_name_except, shell_path, shell_word, terminal_path};
+use crate::text::{file_name_except, hex, shell_path, shell_word, terminal_path};
 use clap::{Args, Subcommand, ValueEnum};
 use minimal_surprise_sim::Path as CodePath;
 use sha2::{Digest, Sha256};
@@ -505,7 +505,7 @@ fn print_status(plan: &Plan, directory: &Path) -> Result<DamagedRuns, RunDirErro
     }
     show_line!("\n{done} of {} different runs done", runs.number());
     if done == runs.number() {
-        show_line!("hash {}", in_hexadecimal(hash));
+        show_line!("hash {}", hex(&hash.finalize()));
     }
     Ok(damaged)
 }
@@ -603,10 +603,7 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
         Share::Whole => (Shard::ALL, searches(&work.read.suite, work.choice)),
         Share::One(shard) => (shard, [].as_slice()),
     };
-    let threads = match &manner.threads {
-        Some(text) => Some(flag("threads", text, |text| count(text, 1024))?),
-        None => None,
-    };
+    let threads = threads_flag(&manner.threads)?;
     // What `evolve` refuses, too, before anything is done.
     CodePath::from_environment().map_err(BadInput::new)?;
     let runs = shard.of_plan(plan);
@@ -648,7 +645,7 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
         files::replace(&directory.join(shard.hashes_file()), &hashes)?;
     }
     // A share's would be one that no other number of shares gives.
-    let hash = (all_done && shard == Shard::ALL).then(|| in_hexadecimal(hash));
+    let hash = (all_done && shard == Shard::ALL).then(|| hex(&hash.finalize()));
     let search_by = match work.share {
         Share::Whole => None,
         Share::One(_) => search_by(work),
@@ -835,11 +832,6 @@ fn each_hash(
         }
     }
     Ok(())
-}
-
-fn in_hexadecimal(hash: Sha256) -> String {
-    let hash = hash.finalize();
-    hash.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

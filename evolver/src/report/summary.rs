@@ -3,6 +3,7 @@
 use super::structures::{self, Classified};
 use crate::experiment::{Experiment, Finding};
 use crate::output::stdout_is_ascii;
+use crate::run_files::{BEST, CONFIG};
 use crate::settings::{describe, model_name};
 use crate::text::shell_path;
 use console::{Style, Term};
@@ -64,7 +65,7 @@ pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> 
     };
     let program = program();
     let at = |file: &str| shell_path(&directory.join(file));
-    let (genome, config) = (at("best.genome"), at("config.toml"));
+    let (genome, config) = (at(BEST), at(CONFIG));
     let directory = shell_path(directory);
     format!(
         "{picture}\n\n\

@@ -10,6 +10,7 @@
 
 use super::{Experiment, Suite, check_combinations, check_seeds};
 use crate::settings::{Given, SettingError, Settings};
+use crate::text::hex;
 use minimal_surprise_controller::KERNEL_ID;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -129,7 +130,7 @@ impl PlannedSettings {
         settings.seed = seed;
         settings.written.seed = seed;
         Some(PlannedRun {
-            id: hex(id(&settings)),
+            id: hex(&id(&settings)),
             seed,
             settings,
             experiment: self.experiment,
@@ -357,10 +358,6 @@ fn id(settings: &Settings) -> [u8; 8] {
     let text = format!("{KERNEL_ID}\n{RESULTS_VERSION}\n{written}");
     let hash = Sha256::digest(text.as_bytes());
     *hash.first_chunk().expect("a hash has 32 bytes")
-}
-
-fn hex(id: [u8; 8]) -> String {
-    id.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// What distinguishes settings, in words.

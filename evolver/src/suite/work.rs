@@ -8,7 +8,7 @@ use super::plan::{Plan, PlannedRun, Runs};
 use crate::evolving::until_finished;
 use crate::experiment::Experiment;
 use crate::files;
-use crate::finished_run::{ReadRunError, complete};
+use crate::finished_run::{Progress, ReadRunError, complete};
 use crate::lock::Holder;
 use crate::run_dir::{Found, RunDir, RunDirError};
 use minimal_surprise_sim::{Engine, Path as CodePath};
@@ -58,17 +58,6 @@ impl Shard {
     pub fn of_plan(self, plan: &Plan) -> Runs<'_> {
         plan.share(self.index, self.of)
     }
-}
-
-/// How far a run is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Progress {
-    /// Nothing is there.
-    Pending,
-    /// It has begun.
-    Begun,
-    /// It is complete.
-    Done,
 }
 
 /// How far a run is, by its files.

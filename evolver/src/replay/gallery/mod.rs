@@ -10,8 +10,9 @@ use super::recording::Recording;
 use super::scene::{Colouring, Ink, Scene};
 use crate::damaged_runs::DamagedRuns;
 use crate::files::{self, Existing, FileError};
-use crate::finished_run::{FinishedRun, ReadRunError};
+use crate::finished_run::{FinishedRun, Progress, ReadRunError};
 use crate::new_dir::{NewDir, remove_abandoned};
+use crate::run_files::{CONFIG, DONE};
 use crate::settings::model_name;
 use crate::text::{new_file_name, terminal_path};
 use minimal_surprise_sim::Structure;
@@ -145,7 +146,7 @@ impl Found {
             .names
             .insert(INDEX.trim_end_matches(".html").to_owned());
         for directory in directories {
-            if holds_run(directory)?.is_some() {
+            if progress(directory)? != Progress::Pending {
                 found.add(directory)?;
             } else {
                 found.look_in(directory, DEPTH)?;
@@ -166,14 +167,14 @@ impl Found {
         }
         inside.sort();
         for path in inside.iter().filter(|path| path.is_dir()) {
-            let looked = match holds_run(path) {
-                Ok(Some(Progress::Complete)) => self.add(path),
-                Ok(Some(Progress::Begun)) => {
+            let looked = match progress(path) {
+                Ok(Progress::Done) => self.add(path),
+                Ok(Progress::Begun) => {
                     self.unfinished += 1;
                     Ok(())
                 }
-                Ok(None) if depth > 1 => self.look_in(path, depth - 1),
-                Ok(None) => Ok(()),
+                Ok(Progress::Pending) if depth > 1 => self.look_in(path, depth - 1),
+                Ok(Progress::Pending) => Ok(()),
                 Err(error) => Err(error),
             };
             if let Err(error) = looked {
@@ -245,20 +246,14 @@ pub fn is_marked(folder: &Path) -> Result<bool, FileError> {
     }
 }
 
-/// How far a run is.
-enum Progress {
-    Begun,
-    Complete,
-}
-
-/// Whether a directory is that of a run.
-fn holds_run(path: &Path) -> Result<Option<Progress>, FileError> {
-    Ok(if files::exists(&path.join("DONE"))? {
-        Some(Progress::Complete)
-    } else if files::exists(&path.join("config.toml"))? {
-        Some(Progress::Begun)
+/// How far the run of a directory is, by its marks; of other directories, nothing is there.
+fn progress(path: &Path) -> Result<Progress, FileError> {
+    Ok(if files::exists(&path.join(DONE))? {
+        Progress::Done
+    } else if files::exists(&path.join(CONFIG))? {
+        Progress::Begun
     } else {
-        None
+        Progress::Pending
     })
 }
 

@@ -9,6 +9,7 @@ use crate::settings::Settings;
 use crate::suite::plan::{Plan, PlannedExperiment, PlannedRun, PlannedSettings, label};
 use crate::suite::search::{Search, look};
 use crate::suite::{Reevaluation, Resilience, Suite};
+use crate::text::hex;
 use minimal_surprise_controller::Controller;
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::structures::{LineCounts, LineOrientation, Structure, classify};
@@ -197,7 +198,7 @@ impl Damaged {
         for (_, row) in self.rows() {
             add_row(&mut hash, row);
         }
-        hex(hash)
+        hex(&hash.finalize())
     }
 
     /// Every row with its name.
@@ -449,7 +450,7 @@ fn reevaluate(asked: &Reevaluation, group: &Group) -> Result<Reevaluated, Report
         experiment: group.experiment.clone(),
         label: group.label.clone(),
         genomes,
-        hash: hex(hash),
+        hash: hex(&hash.finalize()),
     })
 }
 
@@ -472,12 +473,6 @@ fn add_row(hash: &mut Sha256, row: &ResilienceRow) {
     for value in columns.into_iter().flatten() {
         hash.update(value.to_bits().to_le_bytes());
     }
-}
-
-/// A hash in hexadecimal digits.
-pub(super) fn hex(hash: Sha256) -> String {
-    let bytes = hash.finalize();
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A structure by its name in files.
@@ -574,7 +569,7 @@ fn overall<'a>(
     let areas = all.areas.max(1) as f64;
     all.removal_gain /= areas;
     all.repositioning_gain /= areas;
-    all.hash = hex(hash);
+    all.hash = hex(&hash.finalize());
     Ok(all)
 }
 

@@ -21,11 +21,11 @@ use crate::damaged_runs::DamagedRuns;
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::replay::gallery;
 use crate::report::progress::seconds;
-use crate::text::{markdown, new_file_name, shell_word};
+use crate::text::{hex, markdown, new_file_name, shell_word};
 use crate::time_spent::TimeSpent;
 use figures::{Figure, FigureError};
 use findings::{Finding, Verdict};
-use gather::{Gathered, Group, Run, hex};
+use gather::{Gathered, Group, Run};
 use minimal_surprise_sim::{DamageError, Structure, WorldError};
 use paper::PaperValues;
 use serde::Serialize;
@@ -425,7 +425,7 @@ fn making(group: &Group, called: &str) -> Making {
         hash: if group.runs.is_empty() {
             String::new()
         } else {
-            hex(hash)
+            hex(&hash.finalize())
         },
         command: format!("{called} run --only {}", shell_word(&group.experiment)),
         cpu_s: time.cpu_s,
