@@ -7,7 +7,7 @@ use super::statistics::{RUNS_MIN, Test, fisher, mann_whitney, median_interval, s
 use super::tables::MEDIAN_BEST_FITNESS;
 use crate::reevaluation::{mean, median};
 use minimal_surprise_sim::structures::{LineOrientation, Structure};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::collections::BTreeSet;
 
 /// How far a median best fitness may be from the paper's.
@@ -45,6 +45,55 @@ impl Verdict {
     }
 }
 
+/// What a finding rests on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Detail {
+    /// Nothing that is not said with it.
+    None,
+    /// The runs that contradict it.
+    Contradicted(Vec<Contradiction>),
+    /// What became of all runs of a damaged structure, in words.
+    Damaged(String),
+}
+
+/// A run that contradicts a finding.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Contradiction {
+    /// Its seed.
+    pub seed: u64,
+    /// Its name.
+    pub run: String,
+    /// What it formed, and its fitness.
+    pub formed: String,
+}
+
+impl Detail {
+    /// In words, written down by functions for text and for code.
+    pub fn in_words(&self, text: fn(&str) -> String, code: fn(&str) -> String) -> String {
+        let runs = match self {
+            Self::None => return String::new(),
+            Self::Damaged(words) => return text(words),
+            Self::Contradicted(runs) => runs,
+        };
+        let words = runs.iter().map(|run| {
+            let Contradiction { seed, run, formed } = run;
+            format!("seed {seed} ({}), {}", code(run), text(formed))
+        });
+        let words: Vec<String> = words.collect();
+        match words.as_slice() {
+            [one] => format!("Contradicted by {one}"),
+            more => format!("Contradicted by {} runs: {}", more.len(), more.join("; ")),
+        }
+    }
+}
+
+/// As it stands in `findings.csv`.
+impl Serialize for Detail {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.in_words(str::to_owned, |run| format!("`{run}`")))
+    }
+}
+
 /// A finding of the paper, and ours.
 #[derive(Clone, Debug, Serialize)]
 pub struct Finding {
@@ -52,8 +101,8 @@ pub struct Finding {
     pub claim: String,
     /// What we found.
     pub ours: String,
-    /// The runs that contradict it; of a damaged structure, what became of all runs of it.
-    pub detail: String,
+    /// What it rests on.
+    pub detail: Detail,
     /// The test, or how it was told.
     pub test: String,
     /// Its p-value, if it has one.
@@ -120,28 +169,26 @@ fn is_named(run: &Run, structures: &[Structure]) -> bool {
     run.name().is_some_and(|name| structures.contains(&name))
 }
 
-/// The runs of which something is not so, in words: what is theirs, and what they formed.
-fn others(group: &Group, is: impl Fn(&Run) -> bool) -> String {
-    let words = group.runs.iter().filter(|run| !is(run)).map(|run| {
+/// The runs of which something is not so.
+fn others(group: &Group, is: impl Fn(&Run) -> bool) -> Detail {
+    let others = group.runs.iter().filter(|run| !is(run)).map(|run| {
         let mut shares: Vec<_> = Structure::ALL.into_iter().zip(run.shares).collect();
         shares.retain(|(_, share)| *share > 0.0);
         shares.sort_by(|(_, one), (_, two)| two.total_cmp(one));
         let shares = shares
             .iter()
             .map(|(structure, share)| format!("{structure} {:.0} %, ", 100.0 * share));
-        format!(
-            "seed {} (`{}`), {}fitness {:.3}",
-            run.finished.settings.seed,
-            run.id,
-            shares.collect::<String>(),
-            run.fitness()
-        )
+        Contradiction {
+            seed: run.finished.settings.seed,
+            run: run.id.clone(),
+            formed: format!("{}fitness {:.3}", shares.collect::<String>(), run.fitness()),
+        }
     });
-    let words: Vec<String> = words.collect();
-    match words.len() {
-        0 => String::new(),
-        1 => format!("Contradicted by {}", words[0]),
-        more => format!("Contradicted by {more} runs: {}", words.join("; ")),
+    let others: Vec<Contradiction> = others.collect();
+    if others.is_empty() {
+        Detail::None
+    } else {
+        Detail::Contradicted(others)
     }
 }
 
@@ -210,7 +257,7 @@ fn many_structures(gathered: &Gathered) -> Vec<Finding> {
         let enough = names.len() >= 4;
         Some(Finding {
             claim: format!("Sensor model C gives four or more structures on {grid}"),
-            detail: String::new(),
+            detail: Detail::None,
             ours: format!(
                 "{} in {}: {}",
                 names.len(),
@@ -236,7 +283,7 @@ fn most(group: &Group, claim: &str, what: &str, is: impl Fn(&Run) -> bool) -> Fi
     let test = sign(named, others);
     Finding {
         claim: claim.into(),
-        detail: String::new(),
+        detail: Detail::None,
         ours: format!("{what} in {}", of_runs(named, group)),
         test: format!("{} against one half", test.name),
         p: Some(test.p),
@@ -303,7 +350,7 @@ fn predefined(gathered: &Gathered) -> Vec<Finding> {
         Finding {
             claim: "Predefined lines hold a larger share of the robots on 20 × 20 than on 15 × 15"
                 .into(),
-            detail: String::new(),
+            detail: Detail::None,
             ours: format!(
                 "medians {:.1} % ({}) and {:.1} % ({})",
                 100.0 * median(&shares[1]),
@@ -350,7 +397,7 @@ fn partly_predefined(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
                 "Partly predefining raises the share of line runs on {grid} (paper: by {} points)",
                 raised.points
             ),
-            detail: String::new(),
+            detail: Detail::None,
             ours: format!(
                 "by {:+.0} points, from {:.0} % ({}) to {:.0} % ({})",
                 percent(1) - percent(0),
@@ -378,7 +425,7 @@ fn horizontal(gathered: &Gathered) -> Option<Finding> {
     Some(
         Finding {
             claim: "11 × 18 favours horizontal over vertical lines".into(),
-            detail: String::new(),
+            detail: Detail::None,
             ours: format!(
                 "mostly horizontal in {horizontal}, mostly vertical in {}",
                 of_runs(vertical, group)
@@ -432,7 +479,7 @@ fn resilience(resilient: &Resilient) -> Vec<Finding> {
         let Some(damaged) = &resilient.damaged else {
             return Finding {
                 claim,
-                detail: String::new(),
+                detail: Detail::None,
                 ours: format!(
                     "none of {} is named after the structure",
                     counted(resilient)
@@ -473,7 +520,7 @@ fn resilience(resilient: &Resilient) -> Vec<Finding> {
         });
         Finding {
             claim,
-            detail: all_damaged(resilient).unwrap_or_default(),
+            detail: all_damaged(resilient).map_or(Detail::None, Detail::Damaged),
             ours: words.collect::<Vec<_>>().join(", "),
             test: format!("mean shares of each area; {} of the runs", test.name),
             p: Some(test.p),
@@ -542,7 +589,7 @@ fn fitness(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
                 "Median best fitness within {FITNESS_TOLERANCE} of the paper's {} ({}: {}, {})",
                 number.value, group.experiment, group.label, number.source
             ),
-            detail: String::new(),
+            detail: Detail::None,
             ours: interval.map_or_else(
                 || "no runs yet".to_owned(),
                 |i| {

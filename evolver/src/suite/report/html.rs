@@ -98,7 +98,7 @@ pub(super) fn to_look_at(report: &Report) -> String {
 pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
     let mut opening = Vec::new();
     if !report.damaged.is_empty() {
-        let runs: Vec<String> = report.damaged.iter().map(|id| format!("`{id}`")).collect();
+        let runs: Vec<String> = report.damaged.iter().map(|id| markdown_code(id)).collect();
         let line = format!(
             "Left out of everything below, because they are damaged or unreadable: {}, {}.",
             plural(runs.len(), "run"),
@@ -122,8 +122,9 @@ pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
                 markdown(&finding.claim),
                 markdown(&finding.ours)
             );
-            if !finding.detail.is_empty() {
-                let _ = write!(line, ". {}.", markdown(&finding.detail));
+            let detail = finding.detail.in_words(markdown, markdown_code);
+            if !detail.is_empty() {
+                let _ = write!(line, ". {detail}.");
             }
             lines.push(line);
         }
@@ -306,7 +307,41 @@ fn write_making(page: &mut String, report: &Report) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::findings::{Contradiction, Detail, Finding};
     use super::*;
+
+    #[test]
+    fn a_run_that_contradicts_a_finding_is_code_and_what_it_formed_is_text() {
+        let run = Contradiction {
+            seed: 12,
+            run: "f24ee6c408f704a9".to_owned(),
+            formed: "pair 2 %, fitness 0.670 *".to_owned(),
+        };
+        let report = Report {
+            findings: vec![Finding {
+                claim: "All are lines".to_owned(),
+                ours: "lines in 19 of 20 runs".to_owned(),
+                detail: Detail::Contradicted(vec![run]),
+                test: String::new(),
+                p: None,
+                verdict: Verdict::Differs,
+            }],
+            ..Report::default()
+        };
+        let said = |by: &str, text: &str| {
+            let written = format!("lines in 19 of 20 runs. Contradicted by {by}.");
+            assert!(text.contains(&written), "{text}");
+        };
+        let markdown = super::super::markdown::text(&report);
+        said(
+            "seed 12 (`f24ee6c408f704a9`), pair 2 %, fitness 0.670 \\*",
+            &markdown,
+        );
+        said(
+            "seed 12 (<code>f24ee6c408f704a9</code>), pair 2 %, fitness 0.670 *",
+            &page(&report),
+        );
+    }
 
     #[test]
     fn backticks_are_code_stars_stress_and_html_is_text() {

@@ -120,7 +120,7 @@ impl Making {
 }
 
 /// Everything that a report says.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Report {
     /// Name of the suite.
     pub suite: String,

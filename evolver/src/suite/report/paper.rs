@@ -3,6 +3,7 @@
 use minimal_surprise_sim::structures::Structure;
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// All of them.
 #[derive(Clone, Debug, Deserialize)]
@@ -24,6 +25,49 @@ pub struct PaperValues {
     pub raised: Vec<Raised>,
 }
 
+/// Where in the paper numbers are; first the text, then the tables by their numbers.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[serde(try_from = "String")]
+pub enum Source {
+    /// In the text of a section.
+    Section(String),
+    /// In a table.
+    Table(u32),
+}
+
+impl Source {
+    /// A name for a file of its numbers.
+    #[must_use]
+    pub fn file_name(&self) -> String {
+        match self {
+            Self::Section(number) => format!("sec-{number}"),
+            Self::Table(number) => format!("table-{number}"),
+        }
+    }
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Section(number) => write!(f, "Sec. {number}"),
+            Self::Table(number) => write!(f, "Table {number}"),
+        }
+    }
+}
+
+impl TryFrom<String> for Source {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let table = text.strip_prefix("Table ").and_then(|n| n.parse().ok());
+        let section = text.strip_prefix("Sec. ").map(str::to_owned);
+        table
+            .map(Self::Table)
+            .or(section.map(Self::Section))
+            .ok_or_else(|| format!("source = {text}: expected Table n or Sec. n"))
+    }
+}
+
 /// What the shares of a distribution are of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -43,9 +87,9 @@ pub enum Of {
 #[serde(deny_unknown_fields)]
 pub struct Distribution {
     /// Table or section.
-    pub source: String,
+    pub source: Source,
     /// Another table that repeats it.
-    pub also: Option<String>,
+    pub also: Option<Source>,
     /// The experiment.
     pub experiment: String,
     /// The label of the setting.
@@ -95,7 +139,7 @@ impl Distribution {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Number {
     /// Table or section.
-    pub source: String,
+    pub source: Source,
     /// The experiment.
     pub experiment: String,
     /// The label of the setting.
@@ -123,7 +167,7 @@ pub struct MeanMedian {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct StructureValues {
     /// Table.
-    pub source: String,
+    pub source: Source,
     /// The experiment.
     pub experiment: String,
     /// The label of the setting.
@@ -145,7 +189,7 @@ pub struct StructureValues {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DamageValues {
     /// Table.
-    pub source: String,
+    pub source: Source,
     /// The resilience experiment.
     pub resilience: String,
     /// What was done.
@@ -165,7 +209,7 @@ pub struct DamageValues {
 #[serde(deny_unknown_fields)]
 pub struct Raised {
     /// Section.
-    pub source: String,
+    pub source: Source,
     /// The grid.
     pub grid: String,
     /// Percentage points.

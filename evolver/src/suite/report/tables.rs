@@ -3,8 +3,8 @@
 use super::findings::{all_damaged, counted};
 use super::gather::{Gathered, Group, NewStart, Reevaluated, Resilient, Run, structure_named};
 use super::paper::{
-    DAMAGED_GRID, Distribution, GROUPING, MeanMedian, NONE, Of, PaperValues, StructureValues,
-    is_grouping,
+    DAMAGED_GRID, Distribution, GROUPING, MeanMedian, NONE, Of, PaperValues, Source,
+    StructureValues, is_grouping,
 };
 use super::plural;
 use super::statistics::{
@@ -180,23 +180,19 @@ fn structure_tables(
 ) -> Vec<Table> {
     let of_paper =
         |group: &Group| paper.distribution(Of::Structures, &group.experiment, &group.label);
-    let mut sources: Vec<String> = Vec::new();
-    for group in groups {
-        let source = of_paper(group).map_or(String::new(), |d| d.source.clone());
-        if !sources.contains(&source) {
-            sources.push(source);
-        }
-    }
+    let source_of = |group: &Group| of_paper(group).map(|d| &d.source);
+    let mut sources: Vec<Option<&Source>> = groups.iter().map(|group| source_of(group)).collect();
     // In the paper's order; what it does not have comes last.
-    sources.sort_by_key(|source| (source.is_empty(), source.clone()));
+    sources.sort_by_key(|source| (source.is_none(), *source));
+    sources.dedup();
     let tables = sources.into_iter().filter_map(|source| {
         let repeated = gathered.groups.iter().filter(|group| {
-            of_paper(group).is_some_and(|d| d.also.is_some() && d.also.as_ref() == Some(&source))
+            of_paper(group).is_some_and(|d| d.also.is_some() && d.also.as_ref() == source)
         });
         let own = groups
             .iter()
             .copied()
-            .filter(|group| of_paper(group).map_or(String::new(), |d| d.source.clone()) == source);
+            .filter(|group| source_of(group) == source);
         let shared: Vec<Shared<'_>> = repeated
             .chain(own)
             .map(|group| Shared {
@@ -208,24 +204,31 @@ fn structure_tables(
                 paper: of_paper(group),
             })
             .collect();
-        let id = if source.is_empty() {
-            format!("structures-{experiment}")
-        } else if source.starts_with("Table") {
-            file_name(&source)
-        } else {
-            format!("{}-{experiment}", file_name(&source))
+        let id = match source {
+            None => format!("structures-{experiment}"),
+            Some(table @ Source::Table(_)) => table.file_name(),
+            // Several experiments may be told of in a section.
+            Some(section) => format!("{}-{experiment}", section.file_name()),
         };
         let title =
             format!("{experiment}: percentage of runs by the structure they are named after");
         let categories = structure_order(&shared);
-        let table = share_table(id, source, title, Counted::TiedRuns, &shared, &categories);
+        let table = share_table(
+            id,
+            in_words(source),
+            title,
+            Counted::TiedRuns,
+            &shared,
+            &categories,
+        );
         (!categories.is_empty()).then_some(table)
     });
     tables.collect()
 }
 
-fn file_name(source: &str) -> String {
-    source.to_lowercase().replace(". ", "-").replace(' ', "-")
+/// The source of a table in words; none if the paper has no such numbers.
+fn in_words(source: Option<&Source>) -> String {
+    source.map(Source::to_string).unwrap_or_default()
 }
 
 /// The categories of every run; the groupings together if the paper has them so.
@@ -434,11 +437,7 @@ fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table> {
                 && values.structure == structure.name()
         })
     };
-    let source = Structure::ALL
-        .into_iter()
-        .find_map(of_paper)?
-        .source
-        .clone();
+    let source = &Structure::ALL.into_iter().find_map(of_paper)?.source;
     let present: Vec<Structure> = Structure::ALL
         .into_iter()
         .filter(|s| of_paper(*s).is_some() || group.runs.iter().any(|run| run.names.contains(s)))
@@ -507,8 +506,8 @@ fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table> {
             .collect(),
     });
     Some(Table {
-        id: format!("{}-by-structure", file_name(&source)),
-        source,
+        id: format!("{}-by-structure", source.file_name()),
+        source: source.to_string(),
         title: format!(
             "{}, {}: what the runs of each structure are like",
             group.experiment, group.label
@@ -664,7 +663,7 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
     if groups.is_empty() {
         return None;
     }
-    let mut sources: Vec<&str> = groups
+    let mut sources: Vec<String> = groups
         .iter()
         .flat_map(|g| {
             paper
@@ -672,7 +671,7 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
                 .iter()
                 .filter(move |n| n.experiment == experiment && n.setting == g.label)
         })
-        .map(|number| number.source.as_str())
+        .map(|number| number.source.to_string())
         .collect();
     sources.dedup();
     let note = if sources.is_empty() {
@@ -741,10 +740,7 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
     if shared.is_empty() {
         return None;
     }
-    let source = shared
-        .iter()
-        .find_map(|s| s.paper)
-        .map_or(String::new(), |d| d.source.clone());
+    let source = shared.iter().find_map(|s| s.paper).map(|d| &d.source);
     let mut categories: Vec<String> = [
         "mostly vertical",
         "mostly horizontal",
@@ -760,15 +756,11 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
                 .iter()
                 .any(|s| s.runs.iter().flatten().any(|r| r == c))
     });
-    let id = if source.is_empty() {
-        "orientations".to_owned()
-    } else {
-        file_name(&source)
-    };
+    let id = source.map_or("orientations".to_owned(), Source::file_name);
     let title =
         "Percentage of runs, and of genomes from new starts, by the way their lines go".to_owned();
     let counted = Counted::RunsAndGenomes;
-    let mut table = share_table(id, source, title, counted, &shared, &categories);
+    let mut table = share_table(id, in_words(source), title, counted, &shared, &categories);
     let done = |reevaluated: &&Reevaluated| !reevaluated.genomes.is_empty();
     for reevaluated in gathered.reevaluations.iter().filter(done) {
         let all: Vec<&[Structure]> = reevaluated
@@ -853,7 +845,7 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
         .iter()
         .filter(|d| d.resilience == *name)
         .collect();
-    let source = of_paper.first().map_or(String::new(), |d| d.source.clone());
+    let source = of_paper.first().map(|d| &d.source);
     let columns = [
         "fitness",
         "in the structure at the start, %",
@@ -944,13 +936,9 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
         ));
     }
     Table {
-        id: if source.is_empty() {
-            // The figure has the name itself.
-            format!("numbers-{name}")
-        } else {
-            file_name(&source)
-        },
-        source,
+        // The figure has the name itself.
+        id: source.map_or_else(|| format!("numbers-{name}"), Source::file_name),
+        source: in_words(source),
         title: format!("{name}: what becomes of a damaged {}", resilient.structure),
         notes,
         columns: columns.map(str::to_owned).to_vec(),
@@ -965,7 +953,7 @@ mod tests {
     #[test]
     fn a_share_is_compared_with_the_papers_share_of_the_same_runs() {
         let shares = Distribution {
-            source: "Table 5".to_owned(),
+            source: Source::Table(5),
             also: None,
             experiment: "densities".to_owned(),
             setting: "C, 20x20".to_owned(),
