@@ -1,11 +1,17 @@
 //! Notes the revision and the compiler that a program was built from and with, for `meta.json`.
 
+use std::path::Path;
 use std::process::Command;
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
-    println!("cargo:rerun-if-changed=../.git/HEAD");
-    println!("cargo:rerun-if-changed=../.git/logs/HEAD");
+    for file in ["HEAD", "logs/HEAD"] {
+        // What is missing would count as changed in every build.
+        let path = first_line("git", &["rev-parse", "--git-path", file]);
+        if let Some(path) = path.filter(|path| Path::new(path).exists()) {
+            println!("cargo:rerun-if-changed={path}");
+        }
+    }
     let compiler = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned());
     let lines = [
         (

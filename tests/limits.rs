@@ -409,11 +409,7 @@ fn a_long_replay_says_what_it_computes() {
 #[test]
 fn a_robot_that_can_count_no_more_genomes_says_so_and_no_export_makes_one() {
     let container = genome::random(1, Topology::default());
-    let mut exhausted = slot(&container, u32::MAX);
-    exhausted.resize(exhausted.len().next_multiple_of(Flash::WRITE_SIZE), 0xff);
-    let mut flash = Flash::new();
-    flash.write(Flash::OFFSET, &exhausted).unwrap();
-    let mut robot = LinkRobot::start(flash);
+    let mut robot = LinkRobot::start(Flash::with_slot(&slot(&container, u32::MAX)));
     assert_eq!(robot.slots.write_count(), u32::MAX);
     assert_eq!(robot.begin(100, 0), Err(Refusal::CountExhausted));
     // The way back: with both slots erased, it counts from 1 again.

@@ -3,9 +3,13 @@
 #![cfg(target_os = "linux")]
 
 use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Surprise, Topology};
+use minimal_surprise_evolver::report::embedding::slot;
 use minimal_surprise_evolver::robot::{Afterwards, PortName, Robot};
-use minimal_surprise_link::{GenomeInUse, Handler, Report};
+use minimal_surprise_link::{GenomeInUse, Handler, Refusal, Report};
 use serde_json::Value;
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::symlink;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::{Command, Stdio};
 use std::sync::atomic::AtomicBool;
@@ -158,13 +162,16 @@ fn monitor_shows_surprise_and_actions_second_by_second() {
 }
 
 #[test]
-fn monitor_ends_at_ctrl_c() {
+fn monitor_ends_at_ctrl_c_which_is_early_only_before_its_time() {
     let evolver = with_genomes();
     let robot = with_the_old_genome(&evolver, Fault::None);
-    let watching = evolver.start(&["monitor", "--port", &robot.device.port]);
-    watching.wait_for_lines(1);
-    let ended = watching.interrupt(PATIENCE);
-    assert_eq!(ended.code, Some(130), "{ended:?}");
+    for (time, code) in [(&[][..], 0), (&["--for", "600"], 130)] {
+        let arguments = [&["monitor", "--port", &robot.device.port], time].concat();
+        let watching = evolver.start(&arguments);
+        watching.wait_for_lines(1);
+        let ended = watching.interrupt(PATIENCE);
+        assert_eq!(ended.code, Some(code), "{ended:?}");
+    }
 }
 
 #[test]
@@ -279,6 +286,45 @@ fn a_port_that_is_none_is_refused() {
 }
 
 #[test]
+fn a_port_whose_name_is_not_utf8_is_refused_with_the_way_round() {
+    let evolver = with_genomes();
+    let robot = PluggedRobot::start(Flash::new(), Fault::None);
+    let name = OsStr::from_bytes(b"robot\xff");
+    symlink(&robot.device.port, evolver.folder().join(name)).unwrap();
+    let run = evolver.run(&[OsStr::new("start"), OsStr::new("--port"), name]);
+    assert_refused(
+        &run,
+        &[
+            r"--port = robot\xff: its name is not UTF-8",
+            "symbolic link",
+        ],
+    );
+}
+
+#[test]
+fn a_port_with_a_blank_or_a_line_end_is_shown_in_one_line_and_can_be_typed() {
+    let evolver = with_genomes();
+    let robot = with_the_old_genome(&evolver, Fault::None);
+    for port in ["a port", "a\nport", "-a 'port'"] {
+        symlink(&robot.device.port, evolver.folder().join(port)).unwrap();
+        let port = format!("--port={port}");
+        let run = evolver.run(&["hil", "new.genome", &port]);
+        assert_refused(&run, &["put that onto it with: evolver flash new.genome"]);
+        let (_, line) = run.stderr.split_once("with: evolver ").unwrap();
+        let program = evolver.program().display();
+        let typed = evolver.shell(&format!("{program} {line}"));
+        let typed = typed.wait_with_output().unwrap();
+        assert!(typed.status.success(), "{line}: {typed:?}");
+        assert_eq!(
+            typed.stdout.iter().filter(|&&byte| byte == b'\n').count(),
+            1
+        );
+        let again = flash(&evolver, "old.genome", &robot.device.port);
+        assert_eq!(again.code, Some(0), "{again:?}");
+    }
+}
+
+#[test]
 fn a_port_that_says_nothing_is_refused() {
     let evolver = with_genomes();
     let silent = Device::plug_in(|_| Answer::Bytes(Vec::new()));
@@ -361,6 +407,84 @@ fn a_robot_of_another_kernel_is_refused_before_anything_is_stopped_or_erased() {
     }
     assert_eq!(robot.robot().done, 0);
     assert_eq!(crc_in_use(&robot), before);
+}
+
+#[test]
+fn a_robot_that_can_count_no_more_genomes_says_what_to_do_and_is_left_as_it_was_found() {
+    let evolver = with_genomes();
+    let old = evolver.read("old.genome");
+    for running in [true, false] {
+        let robot = PluggedRobot::start(Flash::with_slot(&slot(&old, u32::MAX)), Fault::None);
+        if running {
+            robot.robot().start().unwrap();
+        }
+        let before = robot.robot().identify().genome;
+        let run = flash(&evolver, "new.genome", &robot.device.port);
+        let words = [
+            "has reached its end",
+            "erase both of its genome slots with a debug probe",
+            "it keeps the genome that it had",
+        ];
+        assert_failed(&run, &words);
+        let mut robot = robot.robot();
+        let identity = robot.identify();
+        assert_eq!((identity.genome, identity.running), (before, running));
+        assert!(format!("{before:?}").contains(&crc_of(&old)), "{before:?}");
+    }
+}
+
+#[test]
+fn a_refusal_half_way_leaves_the_robot_as_it_was_found() {
+    let evolver = with_genomes();
+    let chunks = evolver.read("new.genome").len().div_ceil(128) as u64;
+    // 1 is stopping, 2 beginning or resetting; then come chunks and committing, or steps.
+    let refused = [
+        (
+            "flash",
+            4,
+            Refusal::WrongOffset { expected: 9 },
+            "receiving",
+        ),
+        ("flash", 4, Refusal::NoSession, "receiving"),
+        ("flash", 3 + chunks, Refusal::BadGenome, "committing"),
+        ("flash", 3 + chunks, Refusal::Flash, "committing"),
+        ("hil", 2, Refusal::Unsupported, "starting or stopping"),
+        ("hil", 9, Refusal::Unsupported, "stepping"),
+        ("hil", 9, Refusal::NoSession, "stepping"),
+    ];
+    for (command, request, refusal, doing) in refused {
+        for running in [true, false] {
+            let robot = with_the_old_genome(&evolver, Fault::None);
+            if running {
+                robot.robot().start().unwrap();
+            }
+            let before = robot.robot().identify().genome;
+            robot.robot().done = 0;
+            robot.robot().refuses = Some((request, refusal));
+            let genome = if command == "flash" { "new" } else { "old" };
+            let genome = format!("{genome}.genome");
+            let run = evolver.run(&[command, &genome, "--port", &robot.device.port]);
+            let words = format!("refused while the robot was {doing}");
+            assert_failed(&run, &[&words, &refusal.to_string()]);
+            let kept = match (command, refusal) {
+                ("hil", _) => "",
+                (_, Refusal::Flash) => "; it has either the genome that it had or the new one",
+                _ => "; it keeps the genome that it had",
+            };
+            assert_eq!(
+                run.stderr.contains("genome that it had"),
+                command == "flash",
+                "{run:?}"
+            );
+            assert!(run.stderr.contains(kept), "{run:?}");
+            let mut robot = robot.robot();
+            let identity = robot.identify();
+            assert_eq!((identity.genome, identity.running), (before, running));
+            if command == "hil" {
+                assert_eq!(robot.telemetry().surprise, Surprise::default());
+            }
+        }
+    }
 }
 
 #[test]
@@ -463,7 +587,7 @@ fn start_and_stop_do_and_say_so() {
 #[test]
 fn whoever_else_reads_the_port_every_command_ends() {
     let evolver = with_genomes();
-    let rounds = if full::all_cases() { 20 } else { 6 };
+    let rounds = if full::all_cases() { 20 } else { 3 };
     let one = |kind: usize, bytes: usize| {
         let robot = with_the_old_genome(&evolver, Fault::None);
         let port = robot.device.port.clone();
@@ -482,7 +606,13 @@ fn whoever_else_reads_the_port_every_command_ends() {
             1 => vec!["monitor", "--for", "2", "--port", &port],
             _ => vec!["flash", "new.genome", "--port", &port],
         };
-        let run = evolver.start(&arguments).ended(PATIENCE);
+        let running = evolver.start(&arguments);
+        if !full::all_cases() {
+            // Or beginning to write is repeated for 50 s.
+            thread::sleep(Duration::from_secs(4));
+            other.kill().unwrap();
+        }
+        let run = running.ended(PATIENCE);
         other.kill().unwrap();
         other.wait().unwrap();
         if run.code != Some(0) {
@@ -494,10 +624,9 @@ fn whoever_else_reads_the_port_every_command_ends() {
         }
         println!("{kind} {bytes}: {:?} {}", run.code, run.stderr);
     };
-    let kinds = if full::all_cases() { 3 } else { 2 };
     thread::scope(|scope| {
-        let runs: Vec<_> = (0..rounds * kinds)
-            .map(|run| scope.spawn(move || one(run % kinds, [0, 1, 7][run / kinds % 3])))
+        let runs: Vec<_> = (0..rounds * 3)
+            .map(|run| scope.spawn(move || one(run % 3, [0, 1, 7][run / 3 % 3])))
             .collect();
         for run in runs {
             run.join().unwrap();
@@ -514,7 +643,7 @@ fn a_port_that_another_program_has_locked_is_in_use() {
     watching.wait_for_lines(1);
     let run = flash(&evolver, "new.genome", port);
     assert_failed(&run, &[port, "in use by another program"]);
-    assert_eq!(watching.interrupt(PATIENCE).code, Some(130));
+    assert_eq!(watching.interrupt(PATIENCE).code, Some(0));
 }
 
 #[test]
@@ -542,6 +671,26 @@ fn a_board_that_restarts_when_its_port_is_opened_is_waited_for() {
         }
         let run = given_up.join().unwrap();
         assert_failed(&run, &["another device is talking", "--wait 10"]);
+    });
+}
+
+#[test]
+fn wait_is_for_the_first_answer_only() {
+    let evolver = &with_genomes();
+    thread::scope(|scope| {
+        for wait in ["1", "60"] {
+            scope.spawn(move || {
+                // The first chunk is not answered.
+                let robot = with_the_old_genome(evolver, Fault::MuteAfter(3));
+                let port = robot.device.port.as_str();
+                let started = Instant::now();
+                let run = evolver.run(&["flash", "new.genome", "--port", port, "--wait", wait]);
+                let waited = started.elapsed().as_secs_f64();
+                assert_failed(&run, &["no answer any more, while the robot was receiving"]);
+                // Five attempts of half a second.
+                assert!((2.5..20.0).contains(&waited), "{wait}: {waited}");
+            });
+        }
     });
 }
 
@@ -638,7 +787,7 @@ fn a_panic_leaves_the_robot_as_it_was_found() {
         if running {
             robot.robot().start().unwrap();
         }
-        let port = PortName(robot.device.port.clone());
+        let port = PortName(robot.device.port.clone().into());
         let mut line = Robot::connect(&port, 115_200, Duration::from_secs(2), &NEVER).unwrap();
         let panicked = catch_unwind(AssertUnwindSafe(|| {
             line.while_stopped(Afterwards::Runs, "", |_| -> Result<(), _> {

@@ -323,8 +323,16 @@ fn ctrl_c_and_signals_end_it_and_restore_the_terminal() {
     for signal in ["INT", "TERM", "HUP"] {
         let mut terminal = run();
         terminal.signal(signal);
-        assert_eq!(terminal.ended(), 0, "{signal}");
+        assert_eq!(terminal.ended(), 130, "{signal}");
         assert!(terminal.is_restored(), "{signal}");
+    }
+    for more in [vec!["--resume", "run"], evolve("other").skip(1).collect()] {
+        let arguments = [vec!["evolve", "--open"], more].concat();
+        let mut terminal = Terminal::start(&evolver, WINDOW, &[], &arguments);
+        terminal.wait_for("q quit");
+        terminal.signal("TERM");
+        assert_eq!(terminal.ended(), 130, "{arguments:?}");
+        assert!(terminal.is_restored(), "{arguments:?}");
     }
 }
 

@@ -307,9 +307,11 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
         robot.must_run(if runs_new { &new } else { &old }, false, &mut rng);
         match flashed.code {
             Some(0) => assert!(runs_new, "acknowledged, and gone"),
-            // 2 if the port went before it was opened: no such port.
-            Some(1 | 2) => {
+            Some(code @ (1 | 2)) => {
                 assert_eq!(said(&flashed), 1, "one clear message: {flashed:?}");
+                // The port went before it was opened, and only then is it bad input.
+                let no_port = flashed.stderr.contains("no such port");
+                assert_eq!(code == 2, no_port, "{flashed:?}");
                 unheard += u32::from(runs_new);
             }
             _ => panic!("{flashed:?}"),

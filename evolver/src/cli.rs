@@ -135,7 +135,7 @@ fn run(arguments: Cli) -> anyhow::Result<Exit> {
         Some(Command::Evolve(arguments)) => evolve(&arguments),
         Some(Command::Bench { json }) => bench(json).map(done),
         Some(Command::Classify { state, json }) => classify(&state, json).map(done),
-        Some(Command::Replay(arguments)) => replay(&arguments).map(done),
+        Some(Command::Replay(arguments)) => replay(&arguments),
         Some(Command::Gallery(arguments)) => gallery(&arguments),
         Some(Command::Evaluate(arguments)) => evaluate(&arguments).map(done),
         Some(Command::Damage(arguments)) => damage(&arguments).map(done),

@@ -7,7 +7,7 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Signals that ask for an end.
 #[cfg(unix)]
@@ -15,7 +15,7 @@ const SIGNALS: [i32; 3] = [consts::SIGINT, consts::SIGTERM, consts::SIGHUP];
 #[cfg(not(unix))]
 const SIGNALS: [i32; 2] = [consts::SIGINT, consts::SIGTERM];
 
-/// How often it is looked whether one has come. Those that come together, as from a terminal and
+/// How often it is checked whether one has come. Those that come together, as from a terminal and
 /// from its shell, count as one.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -33,22 +33,42 @@ pub fn ask_to_stop() {
     STOP.store(true, Ordering::Relaxed);
 }
 
+/// Waits until then, or until work is to stop.
+pub fn wait_until(moment: Instant) {
+    loop {
+        let left = moment.saturating_duration_since(Instant::now());
+        if left.is_zero() || STOP.load(Ordering::Relaxed) {
+            break;
+        }
+        thread::sleep(LOOK.min(left));
+    }
+}
+
 /// The first signal asks work to stop after this generation, the second ends it at once; both leave
 /// what can be resumed.
 ///
 /// # Errors
 /// If the operating system does not hand signals over.
 pub fn stop_on_signal() -> io::Result<&'static AtomicBool> {
+    ask_then_end("ending after this generation", || {})?;
+    Ok(stop())
+}
+
+/// The first signal asks work to stop and says so, the second calls `last` and ends the program.
+///
+/// # Errors
+/// If the operating system does not hand signals over.
+pub fn ask_then_end(words: &'static str, last: impl Fn() + Send + 'static) -> io::Result<()> {
     let mut asked = false;
     on_signal(move || {
         if asked {
+            last();
             Exit::Interrupted.now();
         }
         asked = true;
         ask_to_stop();
-        tell!("\nending after this generation; Ctrl-C again ends at once");
-    })?;
-    Ok(stop())
+        tell!("\n{words}; Ctrl-C again ends at once");
+    })
 }
 
 /// Calls `handle`, on a thread of its own, whenever a signal asks for an end.

@@ -73,6 +73,11 @@ impl Client {
         }
     }
 
+    /// From the next attempt on, a request is sent at most so many times, and at least once.
+    pub const fn set_attempts_max(&mut self, attempts_max: u32) {
+        self.attempts_max = attempts_max;
+    }
+
     /// The bytes to send for a request. Wait [`Request::timeout_ms`] for the reply.
     ///
     /// # Errors

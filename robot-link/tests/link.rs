@@ -658,6 +658,18 @@ fn a_client_starts_with_nothing_to_tell_and_gives_up_nothing() {
 }
 
 #[test]
+fn the_attempts_of_a_client_can_be_changed_also_under_way() {
+    let mut client = Client::new(7, 1);
+    client.request(&Request::Identify).unwrap();
+    client.set_attempts_max(3);
+    assert!(client.timed_out().is_ok() && client.timed_out().is_ok());
+    assert_eq!(client.timed_out(), Err(GaveUp { attempts: 3 }));
+    client.request(&Request::Stop).unwrap();
+    client.set_attempts_max(0);
+    assert_eq!(client.timed_out(), Err(GaveUp { attempts: 1 }));
+}
+
+#[test]
 fn a_client_counts_what_is_no_frame_by_its_kind() {
     let mut client = Client::new(7, 1);
     let mut wrong_crc = frame_of(&[PROTOCOL_VERSION, 1]);

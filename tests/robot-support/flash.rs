@@ -97,6 +97,19 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         }
     }
 
+    /// The same with this in the first slot.
+    ///
+    /// # Panics
+    /// If it does not fit.
+    #[must_use]
+    pub fn with_slot(slot: &[u8]) -> Self {
+        let mut words = slot.to_vec();
+        words.resize(slot.len().next_multiple_of(W), 0xff);
+        let mut flash = Self::new();
+        flash.write(Self::OFFSET, &words).expect("it fits");
+        flash
+    }
+
     /// Power will fail after so many more moments; `seed` decides what is left behind.
     pub fn cut_power_after(&mut self, moments: u64, seed: u64) {
         self.cut = Some(Cut {

@@ -28,6 +28,8 @@ pub struct LinkRobot {
     pub claims_genome: Option<GenomeInUse>,
     /// What it reports, if that is a lie; its surprise is that of its steps, too.
     pub claims_report: Option<Report>,
+    /// The request, by its number among those done, that it refuses, and why.
+    pub refuses: Option<(u64, Refusal)>,
     /// Requests carried out, identification and telemetry not counted.
     pub done: u64,
 }
@@ -53,6 +55,7 @@ impl LinkRobot {
             errs_in_step: None,
             claims_genome: None,
             claims_report: None,
+            refuses: None,
             done: 0,
         }
     }
@@ -83,7 +86,10 @@ impl LinkRobot {
             return Err(Refusal::Running);
         }
         self.done += 1;
-        Ok(())
+        match self.refuses {
+            Some((request, refusal)) if request == self.done => Err(refusal),
+            _ => Ok(()),
+        }
     }
 
     fn count(&mut self, decision: Decision) {

@@ -176,10 +176,10 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
                         terminal_path(directory)
                     );
                 }
-                if arguments.open {
-                    watch(directory, stop)?;
-                }
-                return Ok(Exit::Done);
+                return match arguments.open {
+                    true => watch(directory, stop),
+                    false => Ok(Exit::Done),
+                };
             }
         },
         None => {
@@ -221,10 +221,10 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
         let directory = shell_path(run.path());
         return stopped(&format!("{program} evolve --resume {directory}"));
     }
-    if arguments.open {
-        watch(run.path(), stop)?;
+    match arguments.open {
+        true => watch(run.path(), stop),
+        false => Ok(Exit::Done),
     }
-    Ok(Exit::Done)
 }
 
 fn draw_seed() -> u64 {
@@ -232,7 +232,7 @@ fn draw_seed() -> u64 {
 }
 
 /// Plays a run that has ended.
-fn watch(directory: &Path, stop: &AtomicBool) -> anyhow::Result<()> {
+fn watch(directory: &Path, stop: &AtomicBool) -> anyhow::Result<Exit> {
     let recording = Recording::of_run(&terminal_path(directory), &FinishedRun::read(directory)?)?;
     in_terminal(&recording, Colouring::default(), stop)
 }

@@ -11,7 +11,7 @@ use crate::limits::Needs;
 use crate::report::progress;
 use crate::robot::{Afterwards, Robot, RobotError, describe, is_in_use};
 use crate::run_files::BEST;
-use crate::text::shell_path;
+use crate::text::{shell_path, terminal_path};
 use clap::Args;
 use indicatif::ProgressBar;
 use minimal_surprise_controller::{Controller, EncodedGenome};
@@ -59,7 +59,7 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
             "--port = {}: the robot runs {}, not {}; put that onto it with: {}",
             port.name(),
             describe(robot.identity().genome),
-            genome.display(),
+            terminal_path(&genome),
             port.command(&format!("flash {}", shell_path(&genome))),
         ))
         .into());

@@ -6,19 +6,14 @@ use crate::exit::Exit;
 use crate::output;
 use crate::robot::{Problem, fault_names, since};
 use crate::settings::count;
-use crate::signals::stop;
+use crate::signals::wait_until;
 use clap::Args;
 use console::Term;
 use minimal_surprise_controller::Surprise;
 use minimal_surprise_link::{LineCounters, Report};
 use serde_json::json;
 use std::io;
-use std::sync::atomic::Ordering;
-use std::thread::sleep;
 use std::time::{Duration, Instant};
-
-/// How often it is looked whether an end is asked for.
-const LOOK: Duration = Duration::from_millis(50);
 
 /// Where the robot is, and how to show it.
 #[derive(Debug, Args)]
@@ -38,9 +33,13 @@ pub struct MonitorArgs {
 /// # Errors
 /// If there is no such robot, it goes away, or what it reports is impossible.
 pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
-    let seconds = match &arguments.seconds {
-        None => u32::MAX,
-        Some(text) => flag("for", text, |text| count(text, u32::MAX))?,
+    // Without a time, being interrupted is how it ends.
+    let (seconds, interrupted) = match &arguments.seconds {
+        None => (u32::MAX, Exit::Done),
+        Some(text) => {
+            let seconds = flag("for", text, |text| count(text, u32::MAX))?;
+            (seconds, Exit::Interrupted)
+        }
     };
     let port = arguments.port.name();
     let mut robot = arguments.port.connect()?;
@@ -55,13 +54,10 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
     let mut before = None;
     let mut exit = Exit::Done;
     for second in 0..=u64::from(seconds) {
-        let next = started + Duration::from_secs(second);
-        while Instant::now() < next && !stop().load(Ordering::Relaxed) {
-            sleep(LOOK.min(next.saturating_duration_since(Instant::now())));
-        }
+        wait_until(started + Duration::from_secs(second));
         let told = match robot.telemetry() {
             Err(error) if matches!(error.problem, Problem::Interrupted { .. }) => {
-                exit = Exit::Interrupted;
+                exit = interrupted;
                 break;
             }
             told => told.map_err(failed)?,

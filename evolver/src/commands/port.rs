@@ -1,14 +1,13 @@
 //! The robot on a serial port, as commands use it.
 
 use super::{BadInput, Interrupted, flag};
-use crate::exit::Exit;
 use crate::report::summary::program;
 use crate::robot::{PortName, Problem, Robot, RobotError, standing};
 use crate::settings::count;
-use crate::signals::{ask_to_stop, on_signal, stop};
+use crate::signals::{ask_then_end, stop};
 use crate::text::shell_path;
 use clap::Args;
-use std::path::Path;
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Speed of the line unless told otherwise.
@@ -19,7 +18,7 @@ const BAUD: &str = "115200";
 pub struct PortArgs {
     /// The serial port that the robot is on, as in /dev/ttyACM0 or COM3.
     #[arg(long, value_name = "PORT")]
-    port: String,
+    port: PathBuf,
     /// Speed of the line, in bits a second.
     #[arg(long, value_name = "N", default_value = BAUD, allow_hyphen_values = true)]
     baud: String,
@@ -35,8 +34,8 @@ pub struct PortArgs {
 
 impl PortArgs {
     /// The port's name.
-    pub(super) fn name(&self) -> &str {
-        &self.port
+    pub(super) fn name(&self) -> PortName {
+        PortName(self.port.clone())
     }
 
     /// Checks the flags and connects. From here on the first signal ends what the command does with
@@ -44,19 +43,12 @@ impl PortArgs {
     pub(super) fn connect(&self) -> anyhow::Result<Robot> {
         let baud = flag("baud", &self.baud, |text| count(text, 12_000_000))?;
         let wait = flag("wait", &self.wait, |text| count(text, 3600))?;
-        let mut asked = false;
-        on_signal(move || {
-            if asked {
-                if let Some(words) = standing() {
-                    tell!("{words}");
-                }
-                Exit::Interrupted.now();
+        ask_then_end("ending", || {
+            if let Some(words) = standing() {
+                tell!("{words}");
             }
-            asked = true;
-            ask_to_stop();
-            tell!("\nending; Ctrl-C again ends at once");
         })?;
-        let port = PortName(self.port.clone());
+        let port = self.name();
         let wait = Duration::from_secs(wait.into());
         let robot = Robot::connect(&port, baud, wait, stop()).map_err(failed)?;
         tell!("{port}: {}", robot.identity());
@@ -65,7 +57,7 @@ impl PortArgs {
 
     /// The line that runs another command on the same port.
     pub(super) fn command(&self, command: &str) -> String {
-        let port = shell_path(Path::new(&self.port));
+        let port = shell_path(&self.port);
         let line = format!("{} {command} --port {port}", program());
         match self.baud.as_str() {
             BAUD => line,
@@ -77,7 +69,9 @@ impl PortArgs {
 /// What a command ends with after an error of port or robot.
 pub(super) fn failed(error: RobotError) -> anyhow::Error {
     match error.problem {
-        Problem::NoSuchPort { .. } | Problem::NotAPort { .. } => BadInput::new(error).into(),
+        Problem::NoSuchPort { .. } | Problem::NotAPort { .. } | Problem::NotUtf8 => {
+            BadInput::new(error).into()
+        }
         Problem::Interrupted { .. } => Interrupted(error.to_string()).into(),
         _ => error.into(),
     }

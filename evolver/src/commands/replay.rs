@@ -5,6 +5,7 @@ use super::damage::corners;
 use super::errors::unusable;
 use super::pictures::PictureArgs;
 use super::{BadInput, flag, read_genome};
+use crate::exit::Exit;
 use crate::files::{self, DATA_BYTES_MAX, Existing};
 use crate::finished_run::FinishedRun;
 use crate::limits::Needs;
@@ -20,7 +21,7 @@ use minimal_surprise_sim::damage::Damage;
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::{Area, Scenario, SeedTree};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The keys of the terminal.
 const KEYS: &str = "\
@@ -73,7 +74,7 @@ pub struct ReplayArgs {
 ///
 /// # Errors
 /// [`BadInput`] if there is nothing to look at, or a flag does not fit.
-pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
+pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<Exit> {
     let overwrite = arguments.overwrite;
     let existing = Existing::with_overwrite(overwrite);
     if let Some(file) = &arguments.html {
@@ -101,12 +102,12 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<()> {
     } else if arguments.html.is_none() {
         // In the terminal Ctrl-C is a key; this is for those who are not at its keyboard.
         on_signal(ask_to_stop)?;
-        in_terminal(&recording, arguments.colour, stop())?;
+        return in_terminal(&recording, arguments.colour, stop());
     }
-    Ok(())
+    Ok(Exit::Done)
 }
 
-/// Plays a recording in the terminal until the user, or `stop`, ends it.
+/// Plays a recording in the terminal until the user, or `stop`, ends it; says which of them did.
 ///
 /// # Errors
 /// [`BadInput`] if there is no terminal.
@@ -114,14 +115,16 @@ pub(super) fn in_terminal(
     recording: &Recording,
     colouring: Colouring,
     stop: &AtomicBool,
-) -> anyhow::Result<()> {
-    terminal::play(recording, colouring, stop).map_err(|error| match error {
-        PlayError::NotATerminal | PlayError::NoCodes(_) => BadInput::new(format!(
-            "{error}; --html, --svg, --png, --gif and --mp4 write files instead"
-        ))
-        .into(),
-        error => error.into(),
-    })
+) -> anyhow::Result<Exit> {
+    match terminal::play(recording, colouring, stop) {
+        Err(error @ (PlayError::NotATerminal | PlayError::NoCodes(_))) => Err(BadInput::new(
+            format!("{error}; --html, --svg, --png, --gif and --mp4 write files instead"),
+        )
+        .into()),
+        // A terminal that closes fails, too.
+        _ if stop.load(Ordering::Relaxed) => Ok(Exit::Interrupted),
+        played => Ok(played.map(|()| Exit::Done)?),
+    }
 }
 
 /// Refuses to write where there is something.

@@ -31,6 +31,12 @@ pub enum Problem {
         /// The ports that there are.
         ports: Vec<String>,
     },
+    /// It cannot be handed to the operating system.
+    #[error(
+        "its name is not UTF-8, and ports with such names cannot be opened; give a symbolic link to \
+         it another name, and use that"
+    )]
+    NotUtf8,
     /// Another program has it.
     #[error("the port is in use by another program; close that first")]
     InUse,
@@ -90,7 +96,7 @@ pub enum Problem {
         doing: Doing,
     },
     /// The robot says no.
-    #[error("refused while the robot was {doing}: {refusal}{}", doing.consequence())]
+    #[error("refused while the robot was {doing}: {refusal}{}", doing.consequence_of(*refusal))]
     Refused {
         /// What was going on.
         doing: Doing,
@@ -165,6 +171,17 @@ impl Doing {
                 "; it has either the genome that it had or the new one: run the command again"
             }
             _ => "",
+        }
+    }
+
+    /// The same after a refusal. A genome that is refused is not in use. But of a lost session it is
+    /// not known whether the request had been carried out before, and a memory that could not be
+    /// read may have the genome after a restart.
+    fn consequence_of(self, refusal: Refusal) -> &'static str {
+        match (self, refusal) {
+            (Self::Committing, Refusal::NoSession | Refusal::Flash) => self.consequence(),
+            (Self::Committing, _) => Self::Receiving.consequence(),
+            _ => self.consequence(),
         }
     }
 }

@@ -1,12 +1,12 @@
 //! One serial port, and one question after another over it.
 
 use super::error::{Doing, Heard, OtherReader, Problem, RobotError};
-use crate::text::terminal;
+use crate::text::terminal_path;
 use minimal_surprise_link::{Client, MalformedMessage, Refusal, Reply, Request};
 use serialport::SerialPort;
 use std::fmt;
 use std::io::{self, ErrorKind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -21,11 +21,11 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// How a user names a port.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PortName(pub String);
+pub struct PortName(pub PathBuf);
 
 impl fmt::Display for PortName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&terminal(&self.0))
+        f.write_str(&terminal_path(&self.0))
     }
 }
 
@@ -59,11 +59,13 @@ impl Line {
             problem,
             left: None,
         };
-        let path = Path::new(&name.0);
+        let path = name.0.as_path();
         if path.is_file() || path.is_dir() {
             return Err(about(Problem::NotAPort { ports: ports() }));
         }
-        let port = open_port(&name.0, baud).map_err(|error| {
+        // The serial library takes text.
+        let text = path.to_str().ok_or_else(|| about(Problem::NotUtf8))?;
+        let port = open_port(text, baud).map_err(|error| {
             about(match error.kind {
                 serialport::ErrorKind::Io(ErrorKind::NotFound) => {
                     Problem::NoSuchPort { ports: ports() }
@@ -108,6 +110,9 @@ impl Line {
         request: &Request<'_>,
         take: impl FnOnce(Reply<'_>) -> Option<T>,
     ) -> Result<T, RobotError> {
+        if self.answered {
+            self.client.set_attempts_max(Client::ATTEMPTS_MAX);
+        }
         let patience = Duration::from_millis(request.timeout_ms().into());
         let started = Instant::now();
         let mut bytes = match self.client.request(request) {

@@ -1,4 +1,9 @@
 //! Whether what a robot reports can be. Nothing is computed with numbers that cannot.
+//!
+//! Not checked, since nothing is computed with them: the write count of a commit, after which the
+//! robot is asked which genome is in use; the counters of the line, any value of which can be, and
+//! which are shown as they are; the offset that a refused chunk should have had, which the message
+//! names.
 
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_controller::{KERNEL_ID, Surprise};
