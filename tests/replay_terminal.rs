@@ -24,12 +24,17 @@ const END: &str = "\x1b[F";
 const ESCAPE: &str = "\x1b";
 const CTRL_C: &str = "\x03";
 
-/// A folder with a short run in `run`.
+const EVALUATE: &str = "evaluate run --starts 2 --steps 20";
+const STATUS: &str = "suite own.toml status --out suite";
+
+/// A folder with a short run in `run`, and a suite.
 fn with_a_run() -> Evolver {
     let evolver = Evolver::built(Profile::Debug);
     let run = evolver.run(&evolve("run").collect::<Vec<_>>());
     assert_eq!(run.code, Some(0), "{run:?}");
     assert!(run.stdout.contains("evolver replay run\n"), "{run:?}");
+    let suite = b"name = \"own\"\n[[experiment]]\nname = \"one\"\nruns = 1\n";
+    evolver.write("own.toml", suite);
     evolver
 }
 
@@ -400,8 +405,9 @@ fn a_terminal_without_codes_gets_plain_lines() {
             assert_eq!(code, 0, "{sent}");
             assert!(sent.contains("generation 2/2  best 0."), "{sent}");
         }
-        assert_eq!(run("classify run").0, 0);
-        assert_eq!(run("--help").0, 0);
+        for line in ["classify run", EVALUATE, STATUS, "--help"] {
+            assert_eq!(run(line).0, 0, "{line}");
+        }
         assert_eq!(run("classify --nosuch").0, 2);
         for line in ["replay run", "evolve --open"] {
             let (code, sent) = run(line);
@@ -433,6 +439,8 @@ fn a_terminal_without_utf8_gets_ascii_and_a_pipe_gets_utf8() {
         let (picture, _) = classified.split_once("\r\n\r\n").unwrap();
         assert_eq!(robots(picture), 100, "{picture}");
         assert!(picture.contains('.'), "{picture}");
+        assert!(run(EVALUATE).contains("mean fitness"));
+        assert!(run(STATUS).contains("0 of 1 done"));
         run("replay --help");
         run("classify --help");
         assert!(run("classify gr\u{fc}n").contains("\\u{fc}"));
@@ -472,6 +480,24 @@ fn no_window_is_too_small_for_any_command() {
     let rows = terminal.rows().join("\n");
     assert!(!rows.contains("/2  best"), "{rows}");
     assert!(rows.contains("(a 15x15 grid is too"), "{rows}");
+    // Only the picture is left out.
+    let piped = evolver.run(&evolve("piped").collect::<Vec<_>>()).stdout;
+    let piped = piped.replace("piped", "narrow");
+    assert_tells_all(&terminal.sent(), &piped, &["fitness", "hash"]);
+    let no_color = [("NO_COLOR", Some("1"))];
+    let (_, sent) = ended_in(&evolver, (40, 20), &no_color, &["classify", "run"]);
+    let piped = evolver.run(&["classify", "run"]).stdout;
+    assert_tells_all(&sent, &piped, &["fitness", "clustering"]);
+}
+
+/// All lines of text that come through a pipe, among them some with these words.
+fn assert_tells_all(sent: &str, piped: &str, words: &[&str]) {
+    for word in words {
+        assert!(piped.contains(word), "no {word:?} in {piped}");
+    }
+    for line in piped.lines().filter(|line| !line.contains('·')) {
+        assert!(sent.contains(line), "no {line:?} in {sent}");
+    }
 }
 
 #[test]
