@@ -31,7 +31,10 @@ while [ "$shard" -lt "$shards" ]; do
     shard=$((shard + 1))
 done
 
+printf '%-9s %10s %11s %10s %5s\n' '' controller robot-slots robot-link all
 for outcome in caught timeout unviable missed; do
-    echo "$outcome: $(cat "$outcomes"/*-of-"$shards"/mutants.out/$outcome.txt | wc -l)"
+    of() { cat "$outcomes"/*-of-"$shards"/mutants.out/$outcome.txt | grep -c "^$1"; }
+    printf '%-9s %10s %11s %10s %5s\n' $outcome \
+        "$(of controller/)" "$(of robot-slots/)" "$(of robot-link/)" "$(of '')"
 done
 cat "$outcomes"/*-of-"$shards"/mutants.out/missed.txt

@@ -375,12 +375,10 @@ fn every_text_file_is_read_whatever_program_saved_it() {
         let line = 2 + text.lines().count();
         let run = evolver.run(arguments);
         assert!(run.code == Some(2), "{arguments:?}: {run:?}");
-        if arguments[0] != "replay" {
-            assert!(
-                run.stderr.contains(&format!("line {line}: byte")),
-                "{arguments:?}: {run:?}"
-            );
-        }
+        assert!(
+            run.stderr.contains(&format!("line {line}: byte")),
+            "{arguments:?}: {run:?}"
+        );
     }
 }
 
@@ -420,7 +418,7 @@ fn no_message_sends_a_terminal_what_a_path_or_a_name_holds() {
     let flag = format!("--{odd}");
     let gallery = format!("{odd}/g");
     let out = format!("{odd}/run");
-    let cases: [(&[&str], i32); 8] = [
+    let cases: [(&[&str], i32); 9] = [
         (&["inspect", odd], 2),
         (&["classify", odd], 2),
         (&["evolve", "odd.toml"], 2),
@@ -428,6 +426,7 @@ fn no_message_sends_a_terminal_what_a_path_or_a_name_holds() {
         (&["evolve", &flag], 2),
         (&["suite", "odd.toml", "plan"], 2),
         (&["evolve", "small.toml", "--out", &out], 0),
+        (&["evaluate", &out, "--starts", "1"], 0),
         (&["gallery", odd, "--out", &gallery], 0),
     ];
     for (arguments, code) in cases {

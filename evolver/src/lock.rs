@@ -3,7 +3,7 @@
 use crate::files::FileError;
 use std::fmt;
 use std::fs::{File, TryLockError};
-use std::io::{Read, Seek, Write};
+use std::io::{Read, Write};
 use std::path::Path;
 
 /// The lock's file in the directory. It says who holds the lock.
@@ -51,7 +51,7 @@ impl Lock {
                 let _ = Holder::this_process().write(&mut file);
                 Ok(Self { _file: Some(file) })
             }
-            Err(TryLockError::WouldBlock) => Err(LockError::Held(Holder::read(&mut file))),
+            Err(TryLockError::WouldBlock) => Err(LockError::Held(Holder::read(&file))),
             Err(TryLockError::Error(_)) => Ok(Self { _file: None }),
         }
     }
@@ -63,9 +63,9 @@ impl Lock {
             .read(true)
             .write(true)
             .open(directory.join(LOCK));
-        let mut file = options.ok()?;
+        let file = options.ok()?;
         file.try_lock().ok()?;
-        let holder = Holder::read(&mut file)?;
+        let holder = Holder::read(&file)?;
         (holder.host == host()).then_some(Self { _file: Some(file) })
     }
 }
@@ -86,9 +86,9 @@ impl Holder {
         file.set_len(line.len() as u64)
     }
 
-    fn read(file: &mut File) -> Option<Self> {
+    /// Reads what a lock's file says.
+    pub fn read(file: impl Read) -> Option<Self> {
         let mut text = String::new();
-        file.rewind().ok()?;
         file.take(400).read_to_string(&mut text).ok()?;
         let (host, process) = text.split_once('\n')?.0.rsplit_once(' ')?;
         // It is shown on terminals.

@@ -96,6 +96,8 @@ fuzz! {
     any_time_is_read_or_refused_with_its_run "run-time";
     any_final_state_is_read_or_refused_with_its_run "run-final";
     any_mark_is_read_or_refused_with_its_run "run-done";
+    any_bytes_are_a_holder_of_a_lock_or_none "lock";
+    any_text_is_a_path_that_is_stored_as_text_and_read_back "path";
     any_bytes_are_settings_or_refused "settings";
     any_bytes_are_a_suite_or_refused "suite";
     any_bytes_are_a_trajectory_or_refused "trajectory";

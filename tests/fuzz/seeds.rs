@@ -55,6 +55,10 @@ pub(crate) fn seeds() -> Vec<Seed> {
     let marked = format!("\u{feff}{}", CHECKPOINT_SETTINGS.replace('\n', "\r\n"));
     add("settings", "marked", marked.into());
     add("suite", "paper", PAPER.into());
+    add("lock", "held", "node-1.example 4711\n".into());
+    add("lock", "longer-before", "a 1\nnode-1.example 4711\n".into());
+    add("path", "plain", "runs/one two".into());
+    add("path", "url", "file:///runs/%ff/one%20two".into());
 
     let c = tests_folder().join("fixtures/exchange/c");
     let read = |name: &str| fs::read_to_string(c.join(name)).unwrap();

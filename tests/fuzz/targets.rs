@@ -10,8 +10,10 @@ use minimal_surprise_controller::neighbours::{CellSize, Neighbours};
 use minimal_surprise_controller::{Controller, EncodedGenome, SensorBits, SensorModel, Topology};
 use minimal_surprise_evolver::checkpoint;
 use minimal_surprise_evolver::finished_run::FinishedRun;
+use minimal_surprise_evolver::lock::Holder;
 use minimal_surprise_evolver::settings::{Given, Settings};
 use minimal_surprise_evolver::suite::Suite;
+use minimal_surprise_evolver::text::{is_hidden, path_of_text, text_of_path};
 use minimal_surprise_link::{Client, FRAME_BYTES_MAX, Request, Server, decode_reply};
 use minimal_surprise_sim::drawing;
 use minimal_surprise_sim::exchange::{Trajectory, import_genome, read_agents, read_genomes};
@@ -29,7 +31,7 @@ use tempfile::TempDir;
 pub(crate) type Target = (&'static str, fn(&[u8]) -> bool);
 
 /// All of them.
-pub(crate) const TARGETS: [Target; 18] = [
+pub(crate) const TARGETS: [Target; 20] = [
     ("genome", genome),
     ("checkpoint", checkpoint),
     ("run-config", |bytes| run_file("config.toml", bytes)),
@@ -41,6 +43,8 @@ pub(crate) const TARGETS: [Target; 18] = [
     ("run-time", |bytes| run_file("time.json", bytes)),
     ("run-final", |bytes| run_file("final.json", bytes)),
     ("run-done", |bytes| run_file("DONE", bytes)),
+    ("lock", lock),
+    ("path", path),
     ("settings", settings),
     ("suite", suite),
     ("trajectory", trajectory),
@@ -208,6 +212,26 @@ fn settings(bytes: &[u8]) -> bool {
     };
     let written = toml::to_string(&settings.written).unwrap();
     assert_eq!(read_settings(written.as_bytes()), Some(settings));
+    true
+}
+
+fn lock(bytes: &[u8]) -> bool {
+    let Some(holder) = Holder::read(bytes) else {
+        return false;
+    };
+    assert!(!holder.to_string().chars().any(is_hidden), "{holder:?}");
+    let written = format!("{} {}\n", holder.host, holder.process);
+    assert_eq!(Holder::read(written.as_bytes()), Some(holder));
+    true
+}
+
+fn path(bytes: &[u8]) -> bool {
+    let Some(text) = text(bytes) else {
+        return false;
+    };
+    let path = path_of_text(text);
+    let again = path_of_text(&text_of_path(&path));
+    assert!(again == path || Ok(again) == std::path::absolute(&path).map_err(drop));
     true
 }
 

@@ -9,6 +9,7 @@ use crate::reevaluation::rerun;
 use crate::report::reevaluation::{Condition, conditions_json, conditions_text};
 use crate::run_files::CONFIG;
 use crate::settings::{Settings, count, parse_grid, probability};
+use crate::text::terminal_path;
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_sim::{NoiseRate, Scenario, SeedTree};
@@ -119,7 +120,7 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     } else {
         show_line!(
             "{}: {starts} new starts of {steps} steps each, seed {seed}\n\n{}",
-            file.display(),
+            terminal_path(&file),
             conditions_text(&conditions)
         );
     }

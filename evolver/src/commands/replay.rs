@@ -185,7 +185,9 @@ fn recording(arguments: &ReplayArgs) -> anyhow::Result<Recording> {
                 .map_err(|error| BadInput::new(format!("{name}, {error}")))?;
             Ok(Recording::of_trajectory(&name, &trajectory).map_err(BadInput::new)?)
         }
-        Err(error @ TextError::Utf16) => Err(BadInput::new(format!("{name}: {error}")).into()),
+        Err(error) if error == TextError::Utf16 || bytes.starts_with(b"Gen:") => {
+            Err(BadInput::new(format!("{name}: {error}")).into())
+        }
         _ => of_genome(arguments, path, &name),
     }
 }

@@ -25,8 +25,8 @@ pub struct PaperValues {
     pub raised: Vec<Raised>,
 }
 
-/// Where in the paper numbers are; first the text, then the tables by their numbers.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+/// Where in the paper numbers are.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
 pub enum Source {
     /// In the text of a section.

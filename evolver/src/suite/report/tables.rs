@@ -182,8 +182,8 @@ fn structure_tables(
         |group: &Group| paper.distribution(Of::Structures, &group.experiment, &group.label);
     let source_of = |group: &Group| of_paper(group).map(|d| &d.source);
     let mut sources: Vec<Option<&Source>> = groups.iter().map(|group| source_of(group)).collect();
-    // In the paper's order; what it does not have comes last.
-    sources.sort_by_key(|source| (source.is_none(), *source));
+    // By their names; what the paper does not have comes last.
+    sources.sort_by_key(|source| (source.is_none(), in_words(*source)));
     sources.dedup();
     let tables = sources.into_iter().filter_map(|source| {
         let repeated = gathered.groups.iter().filter(|group| {
