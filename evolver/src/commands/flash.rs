@@ -4,7 +4,6 @@ use super::port::{PortArgs, failed};
 use super::read_genome;
 use crate::report::progress::bar;
 use crate::robot::Afterwards;
-use crate::text::terminal;
 use clap::Args;
 use indicatif::ProgressBar;
 use std::path::PathBuf;
@@ -39,6 +38,6 @@ pub fn flash(arguments: &FlashArgs) -> anyhow::Result<()> {
     bar.finish_and_clear();
     written.map_err(failed)?;
     let identity = robot.identify().map_err(failed)?;
-    show_line!("{}: {identity}", terminal(port.name()));
+    show_line!("{}: {identity}", port.name());
     Ok(())
 }

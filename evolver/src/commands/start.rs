@@ -1,7 +1,6 @@
 //! `evolver start` and `evolver stop`: a robot runs its control loop, or stands.
 
 use super::port::{PortArgs, failed};
-use crate::text::terminal;
 
 /// Starts the robot.
 ///
@@ -27,6 +26,6 @@ fn switch(arguments: &PortArgs, runs: bool) -> anyhow::Result<()> {
     };
     switched.map_err(failed)?;
     let identity = robot.identify().map_err(failed)?;
-    show_line!("{}: {identity}", terminal(arguments.name()));
+    show_line!("{}: {identity}", arguments.name());
     Ok(())
 }
