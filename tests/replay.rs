@@ -583,8 +583,7 @@ fn numbers_that_cannot_be_are_refused_in_every_file_of_a_run() {
         assert_ne!(text.as_bytes(), good, "{file}");
         evolver.write(&file, text.as_bytes());
         let run = evolver.run(&words("replay run --what fitness --svg a.svg"));
-        assert_ne!(run.code, Some(0), "{run:?}");
-        assert!(run.stderr.contains(problem), "{file}: {run:?}");
+        run.assert_failed(&[problem]);
         assert_eq!(run.stderr.lines().count(), 1, "{run:?}");
         assert!(!evolver.folder().join("a.svg").exists(), "{file}");
         evolver.write(&file, &good);
@@ -610,8 +609,7 @@ fn numbers_that_cannot_be_are_refused_in_every_file_of_a_run() {
     replay(&evolver, "run --what fitness --svg a.svg");
     evolver.write("run/DONE", b"zzz\n");
     let resumed = evolver.run(&["evolve", "--resume", "run"]);
-    assert_ne!(resumed.code, Some(0), "{resumed:?}");
-    assert!(resumed.stderr.contains("64 digits"), "{resumed:?}");
+    resumed.assert_failed(&["run/DONE", "64 digits"]);
 }
 
 #[test]
@@ -727,10 +725,15 @@ fn a_run_with_the_genome_or_the_state_of_another_is_refused_by_all_who_replay_it
         "0"
     };
     other_hash.replace_range(hash_at..=hash_at, digit);
+    let steps = "best.genome does not take the steps that final.json records";
     let spoilt = [
-        ("best.genome", evolver.read("other/best.genome")),
-        ("final.json", evolver.read("other/final.json")),
-        ("final.json", other_hash.into_bytes()),
+        ("best.genome", evolver.read("other/best.genome"), steps),
+        (
+            "final.json",
+            evolver.read("other/final.json"),
+            "final.json has another hash than DONE",
+        ),
+        ("final.json", other_hash.into_bytes(), steps),
     ];
     let lines = [
         "classify run",
@@ -742,13 +745,13 @@ fn a_run_with_the_genome_or_the_state_of_another_is_refused_by_all_who_replay_it
         "export run --format trajectory --out out",
         "gallery run --out out",
     ];
-    for (file, bytes) in spoilt {
+    for (file, bytes, problem) in spoilt {
         let file = format!("run/{file}");
         let good = evolver.read(&file);
         evolver.write(&file, &bytes);
         for line in lines {
             let run = evolver.run(&words(line));
-            run.assert_failed(&["error: run: ", "final.json", "another"]);
+            run.assert_failed(&["error: run: ", problem]);
             assert!(!evolver.folder().join("out").exists(), "{line}");
         }
         evolver.write(&file, &good);
