@@ -6,8 +6,13 @@ use std::os::unix::fs::{FileTypeExt, symlink};
 use std::path::Path;
 use std::process::Command;
 use std::thread;
+use std::time::{Duration, Instant};
 use tests::disk::Disk;
 use tests::program::Evolver;
+use tests::tools;
+
+/// Longer than anything here takes.
+const PATIENCE: Duration = Duration::from_secs(120);
 
 const EVOLVE: [&str; 11] = [
     "evolve",
@@ -38,36 +43,32 @@ fn evolve(evolver: &Evolver, out: &str) {
 #[test]
 fn on_a_full_disk_nothing_is_left_and_the_second_try_succeeds() {
     let evolver = with_a_run();
-    let Some(disk) = Disk::mounted_at(evolver.folder().join("disk"), "8k") else {
-        println!("skipped: no file system can be mounted here");
+    let Some(disk) = tools::require(Disk::mounted_at(evolver.folder().join("disk"), "8k")) else {
         return;
     };
-    let writers: [&[&str]; 3] = [
-        &[
-            "export",
-            "r",
-            "--format",
-            "trajectory",
-            "--out",
-            "disk/file",
-        ],
-        &["gallery", "r", "--threads", "1", "--out", "disk/gallery"],
-        &["replay", "r", "--html", "disk/page.html"],
+    let trajectory = "export r --format trajectory --out disk/file";
+    let writers = [
+        // Its size is known before.
+        (trajectory, 2, "of disk would be needed"),
+        (
+            "gallery r --threads 1 --out disk/gallery",
+            1,
+            "No space left",
+        ),
+        ("replay r --html disk/page.html", 1, "No space left"),
     ];
-    for writer in writers {
-        let full = evolver.run(writer);
-        assert_eq!(full.code, Some(1), "{writer:?}: {full:?}");
-        assert!(
-            full.stderr.contains("No space left"),
-            "{writer:?}: {full:?}"
-        );
+    let run = |writer: &str| evolver.run(&writer.split(' ').collect::<Vec<_>>());
+    for (writer, code, said) in writers {
+        let full = run(writer);
+        assert_eq!(full.code, Some(code), "{writer}: {full:?}");
+        assert!(full.stderr.contains(said), "{writer}: {full:?}");
         let left = fs::read_dir(evolver.folder().join("disk")).unwrap().count();
-        assert_eq!(left, 0, "{writer:?}");
+        assert_eq!(left, 0, "{writer}");
     }
     disk.remount("size=64m");
-    for writer in writers {
-        let again = evolver.run(writer);
-        assert_eq!(again.code, Some(0), "{writer:?}: {again:?}");
+    for (writer, ..) in writers {
+        let again = run(writer);
+        assert_eq!(again.code, Some(0), "{writer}: {again:?}");
     }
 }
 
@@ -75,8 +76,10 @@ fn on_a_full_disk_nothing_is_left_and_the_second_try_succeeds() {
 fn a_run_that_a_disk_has_no_room_for_leaves_nothing() {
     let evolver = with_a_run();
     // Bytes enough, so that it is begun, but not for as many files.
-    let Some(disk) = Disk::mounted_at(evolver.folder().join("disk"), "64m,nr_inodes=5") else {
-        println!("skipped: no file system can be mounted here");
+    let Some(disk) = tools::require(Disk::mounted_at(
+        evolver.folder().join("disk"),
+        "64m,nr_inodes=5",
+    )) else {
         return;
     };
     let evolve = [
@@ -96,6 +99,54 @@ fn a_run_that_a_disk_has_no_room_for_leaves_nothing() {
     assert_eq!(left, 0);
     disk.remount("nr_inodes=100");
     assert_eq!(evolver.run(&evolve).code, Some(0));
+}
+
+#[test]
+fn a_run_on_a_disk_that_gets_full_meanwhile_can_be_resumed() {
+    let evolver = Evolver::in_empty_folder();
+    let Some(_disk) = tools::require(Disk::mounted_at(evolver.folder().join("disk"), "8m")) else {
+        return;
+    };
+    let long = [
+        "--generations",
+        "400",
+        "--repetitions",
+        "1",
+        "--steps",
+        "2000",
+    ];
+    let evolve = |out| {
+        let settings = [&EVOLVE[..7], &["--seed", "7", "--out", out]].concat();
+        [&settings[..], &long].concat()
+    };
+    let running = evolver.start(&evolve("disk/run"));
+    let started = Instant::now();
+    while !evolver.folder().join("disk/run/checkpoint").exists() {
+        assert!(started.elapsed() < PATIENCE, "no checkpoint yet");
+        thread::sleep(Duration::from_millis(1));
+    }
+    let filler = evolver.folder().join("disk/filler");
+    let filled = fs::write(&filler, vec![0; 16 << 20]);
+    assert!(filled.is_err(), "the disk is full");
+    let full = running.ended(PATIENCE);
+    assert_eq!(full.code, Some(1), "{full:?}");
+    for words in ["No space left", "disk/run/"] {
+        assert!(full.stderr.contains(words), "no {words:?}: {full:?}");
+    }
+    assert!(!evolver.folder().join("disk/run/DONE").exists());
+    fs::remove_file(filler).unwrap();
+    let resumed = evolver.run(&["evolve", "--resume", "disk/run"]);
+    assert_eq!(resumed.code, Some(0), "{resumed:?}");
+    let elsewhere = evolver.run(&evolve("elsewhere"));
+    assert_eq!(elsewhere.code, Some(0), "{elsewhere:?}");
+    assert_eq!(
+        evolver.text("disk/run/DONE"),
+        evolver.text("elsewhere/DONE")
+    );
+    let left = fs::read_dir(evolver.folder().join("disk/run")).unwrap();
+    let part = |name: &str| Path::new(name).extension().is_some_and(|end| end == "part");
+    let parts = left.filter(|entry| part(&entry.as_ref().unwrap().file_name().to_string_lossy()));
+    assert_eq!(parts.count(), 0);
 }
 
 #[test]
@@ -167,8 +218,7 @@ fn overwriting_a_mounted_file_writes_to_it() {
         evolver.write(name, b"old");
     }
     let at = |name: &str| evolver.folder().join(name);
-    let Some(_mounted) = Disk::bound(&at("outside.svg"), at("mounted.svg")) else {
-        println!("skipped: no file can be mounted here");
+    let Some(_mounted) = tools::require(Disk::bound(&at("outside.svg"), at("mounted.svg"))) else {
         return;
     };
     let written = svg(&evolver, "mounted.svg");

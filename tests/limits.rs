@@ -9,14 +9,19 @@ use minimal_surprise_evolver::limits::{self, Needs};
 use minimal_surprise_evolver::report::embedding::slot;
 use minimal_surprise_evolver::run_dir::RunDir;
 use minimal_surprise_evolver::settings::{DRAWN_SEED_MAX, Given, Settings};
+use minimal_surprise_evolver::suite::Suite;
+use minimal_surprise_evolver::suite::plan::Plan;
 use minimal_surprise_link::{Handler, Refusal};
 use minimal_surprise_slots::{Buffer, Slots};
 use robot_support::link_robot::{Flash, LinkRobot};
 use serde_json::Value;
 use std::fs::{self, File};
 use std::process::{Command, Stdio};
-use tests::genome;
+use std::thread;
+use std::time::{Duration, Instant};
+use tests::disk::Disk;
 use tests::program::{Evolver, Finished};
+use tests::{genome, tools};
 use wait4::Wait4;
 
 /// A tiny evolution, in which one setting at a time is made large.
@@ -30,6 +35,8 @@ const TINY: [(&str, &str); 6] = [
 ];
 /// Threads of the program; each has some memory of its own.
 const THREADS: u32 = 2;
+/// Longer than anything here takes.
+const PATIENCE: Duration = Duration::from_secs(120);
 /// What the program takes for itself, in bytes.
 const PROGRAM: f64 = 16e6;
 
@@ -143,6 +150,158 @@ fn the_memory_of_a_replay_and_of_new_starts_is_near_its_estimate() {
 }
 
 #[test]
+fn memory_that_is_used_for_one_condition_after_the_other_is_counted_once() {
+    let evolver = Evolver::in_empty_folder();
+    let made = evolver.run(&evolve(&[("out", "run")]));
+    assert_eq!(made.code, Some(0), "{made:?}");
+    let evaluate = words(&format!(
+        "evaluate run --grid 4000x4000 --robots 10 --noise 0,0.1,0.2,0.3,0.4 --steps 1 --starts 2 \
+         --threads {THREADS}"
+    ));
+    let scenario = settings(&[("grid", "4000x4000"), ("robots", "10")]).scenario;
+    let needs = Needs::of_starts(&[(scenario, ()); 5], ("starts", 2), f64::from(THREADS));
+    let measured = peak(&evolver, &evaluate);
+    assert_near("five conditions", needs.memory() + PROGRAM, measured);
+}
+
+#[test]
+fn a_run_that_there_is_no_memory_for_is_not_damaged_and_is_resumed_where_there_is() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.write("one.toml", ONE_LARGE.as_bytes());
+    let suite = Suite::read(&evolver.folder().join("one.toml")).unwrap();
+    let plan = Plan::new(&suite, None, None, false).unwrap();
+    let run = plan.runs().iter().next().unwrap();
+    let directory = run.directory(&evolver.folder().join("suite"));
+    let begun = evolver.start(&words("suite one.toml run --out suite"));
+    let started = Instant::now();
+    while !directory.join("checkpoint").exists() {
+        assert!(started.elapsed() < PATIENCE, "no checkpoint yet");
+        thread::sleep(Duration::from_millis(1));
+    }
+    assert!(!begun.kill(), "it was not done yet");
+    let files = evolver.files();
+    let status = "suite one.toml status --out suite";
+    let status = within(&evolver, SHORT, &words(status));
+    assert_eq!(status.code, Some(0), "{status:?}");
+    assert!(status.stdout.contains("1 begun"), "{status:?}");
+    let resume = format!("evolve --resume {}", directory.display());
+    for arguments in ["suite one.toml run --out suite", &resume] {
+        let refused = within(&evolver, SHORT, &words(arguments));
+        assert_eq!(refused.code, Some(2), "{arguments}: {refused:?}");
+        for word in ["population = 100000", "of memory would be needed"] {
+            assert!(refused.stderr.contains(word), "{arguments}: {refused:?}");
+        }
+        assert!(!refused.stderr.contains("delete"), "{refused:?}");
+    }
+    let unchanged = evolver.files();
+    let is_lock = |file: &&String| file.ends_with(".lock");
+    assert!(
+        unchanged
+            .iter()
+            .filter(|file| !is_lock(file))
+            .eq(files.iter().filter(|file| !is_lock(file)))
+    );
+
+    // Once the large one is done, the small one needs little; nor does a share without it.
+    evolver.write("both.toml", format!("{ONE_LARGE}{ONE_SMALL}").as_bytes());
+    let small = "run-task --suite both.toml --shard 1/2 --out suite --threads 1";
+    let small = within(&evolver, SHORT, &words(small));
+    assert_eq!(small.code, Some(0), "{small:?}");
+    let all = evolver.run(&words("suite both.toml run --out suite"));
+    assert_eq!(all.code, Some(0), "{all:?}");
+    let again = within(
+        &evolver,
+        SHORT,
+        &words("suite both.toml run --out suite --threads 1"),
+    );
+    assert_eq!(again.code, Some(0), "{again:?}");
+}
+
+#[test]
+fn a_run_is_resumed_if_there_is_memory_for_the_threads_that_are_asked_for() {
+    let evolver = Evolver::in_empty_folder();
+    let settings = settings(&[
+        ("grid", "300x300"),
+        ("robots", "40000"),
+        ("population", "512"),
+    ]);
+    let run = evolver.folder().join("run");
+    drop(RunDir::create(&run, &Experiment::new(settings.clone())).unwrap());
+    let needs = |threads| Needs::of_evolution(&settings, threads).memory();
+    let kilobytes = ((needs(1.0) + needs(512.0)) / 2.0 / 1000.0) as u32;
+    let resume = |threads| words(&format!("evolve --resume run --threads {threads}"));
+    let refused = within(&evolver, kilobytes, &resume(512));
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.stderr.contains("robots = 40000"), "{refused:?}");
+    let done = within(&evolver, kilobytes, &resume(1));
+    assert_eq!(done.code, Some(0), "{done:?}");
+}
+
+#[test]
+fn the_text_of_a_trajectory_is_nearly_as_long_as_estimated() {
+    let evolver = Evolver::in_empty_folder();
+    let of = [("grid", "15x15"), ("robots", "100"), ("steps", "2000")];
+    let made = evolver.run(&evolve(&[&of[..], &[("out", "run")]].concat()));
+    assert_eq!(made.code, Some(0), "{made:?}");
+    let exported = evolver.run(&words("export run --format trajectory --out text"));
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+    let measured = evolver.read("text").len() as f64;
+    let estimated = Needs::of_trajectory(&settings(&of).scenario).disk();
+    assert_near("trajectory", estimated, measured);
+}
+
+#[test]
+fn what_the_disk_has_no_room_for_is_refused_before_anything_is_written() {
+    let evolver = Evolver::in_empty_folder();
+    let run = [("steps", "2000"), ("robots", "20"), ("out", "run")];
+    assert_eq!(evolver.run(&evolve(&run)).code, Some(0));
+    let disk = evolver.folder().join("disk");
+    let Some(_disk) = tools::require(Disk::mounted_at(disk.clone(), "500k")) else {
+        return;
+    };
+    evolver.write(
+        "many.toml",
+        format!("name = \"many\"\n{ONE_SMALL}")
+            .replace("runs = 1", "runs = 1000")
+            .as_bytes(),
+    );
+    let runs = disk.join("suite/runs");
+    for (name, files) in [("without others", 0), ("with others'", 60)] {
+        fs::create_dir_all(&runs).unwrap();
+        for file in 0..files {
+            fs::create_dir(runs.join(format!("folder {file}"))).unwrap();
+        }
+        let there = fs::read_dir(&runs).unwrap().count();
+        for (arguments, said) in [
+            (
+                "evolve --population 3000 --out disk/new",
+                "population = 3000",
+            ),
+            (
+                "evolve --out disk/new --generations 9999",
+                "generations = 9999",
+            ),
+            ("suite many.toml run --out disk/suite", "1000 runs to do"),
+            (
+                "export run --format trajectory --out disk/text",
+                "steps = 2000",
+            ),
+        ] {
+            let refused = evolver.run(&words(arguments));
+            assert_eq!(refused.code, Some(2), "{name}: {arguments}: {refused:?}");
+            for word in [said, "of disk would be needed", "are free in disk"] {
+                assert!(
+                    refused.stderr.contains(word),
+                    "{name}: {arguments}: {refused:?}"
+                );
+            }
+            assert_eq!(fs::read_dir(&runs).unwrap().count(), there, "{arguments}");
+            assert_eq!(fs::read_dir(&disk).unwrap().count(), 1, "{arguments}");
+        }
+    }
+}
+
+#[test]
 fn the_files_of_a_run_have_nearly_the_estimated_sizes() {
     let scratch = tempfile::tempdir().unwrap();
     for of in [[("population", "3000")], [("population", "300")]] {
@@ -196,12 +355,49 @@ fn suite(evolver: &Evolver, runs: u32, robots: u32) {
     evolver.write("large.toml", text.as_bytes());
 }
 
+/// Kilobytes of address space that are too few for the large run of a suite.
+const SHORT: u32 = 300_000;
+/// A suite of one run for which that is too little, but little is computed.
+const ONE_LARGE: &str = "
+    name = \"own\"
+    [[experiment]]
+    name = \"large\"
+    runs = 1
+    grids = [\"5x5\"]
+    robots = [2]
+    population = 100000
+    generations = 2
+    repetitions = 1
+    steps = 1
+";
+/// Another experiment.
+const ONE_SMALL: &str = "
+    [[experiment]]
+    name = \"small\"
+    runs = 1
+    grids = [\"5x5\"]
+    robots = [2]
+    population = 2
+    generations = 1
+    repetitions = 1
+    steps = 1
+";
+
 #[test]
 fn what_this_machine_cannot_hold_is_refused_before_anything_is_written() {
     let evolver = Evolver::in_empty_folder();
     let made = evolver.run(&evolve(&[("out", "run")]));
     assert_eq!(made.code, Some(0), "{made:?}");
+    let long = [("steps", "1000000"), ("out", "long")];
+    let made = evolver.run(&evolve(&long));
+    assert_eq!(made.code, Some(0), "{made:?}");
     suite(&evolver, 1_000_000, 1200);
+    evolver.write(
+        "again.toml",
+        b"name = \"a\"\n[[experiment]]\nname = \"one\"\nruns = 1\ngrids = [\"100x100\"]\n\
+          robots = [10000]\n[[re-evaluation]]\nname = \"again\"\nof = [\"one\"]\n\
+          starts = 1000000\n",
+    );
     evolver.write(
         "memory.toml",
         b"name = \"m\"\n[[experiment]]\nname = \"one\"\nruns = 1\npopulation = 1000000\n",
@@ -237,6 +433,7 @@ fn what_this_machine_cannot_hold_is_refused_before_anything_is_written() {
             "hil run/best.genome --simulate --steps 4294967295",
             "steps = 4294967295",
         ),
+        ("suite again.toml report --out new", "starts = 1000000"),
         ("suite memory.toml run --out new", "population = 1000000"),
         (
             "run-task --suite memory.toml --shard 0/1 --out new",
@@ -251,6 +448,11 @@ fn what_this_machine_cannot_hold_is_refused_before_anything_is_written() {
             assert!(refused.stderr.contains(word), "{arguments}: {refused:?}");
         }
     }
+    let gallery = words("gallery run long --out new --threads 1");
+    let refused = within(&evolver, 200_000, &gallery);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.stderr.contains("steps = 1000000"), "{refused:?}");
+    assert_eq!(evolver.files(), files, "{refused:?}");
     // Not even the bits of one run could be counted; a replay has no population.
     let endless =
         "replay run/best.genome --grid 16384x16384 --robots 268435456 --steps 4294967295 --svg a";
@@ -260,18 +462,21 @@ fn what_this_machine_cannot_hold_is_refused_before_anything_is_written() {
         refused.stderr.contains("--robots = 268435456: "),
         "{refused:?}"
     );
-    for arguments in [
-        "suite large.toml run --out new",
-        "run-task --suite large.toml --shard 0/2 --out new",
-        "suite large.toml submit --engine slurm --out new",
+    for (arguments, runs) in [
+        ("suite large.toml run --out new", "1200000000"),
+        (
+            "run-task --suite large.toml --shard 0/2 --out new",
+            "600000000",
+        ),
+        (
+            "suite large.toml submit --engine slurm --out new",
+            "1200000000",
+        ),
     ] {
+        let runs = format!("{runs} runs to do");
         let refused = evolver.run(&words(arguments));
         assert_eq!(refused.code, Some(2), "{arguments}: {refused:?}");
-        for word in [
-            "1200000000 runs in the suite",
-            "of disk would be needed",
-            "are free in new",
-        ] {
+        for word in [&runs, "of disk would be needed", "are free in new"] {
             assert!(refused.stderr.contains(word), "{arguments}: {refused:?}");
         }
         assert_eq!(evolver.files(), files, "{arguments}");
@@ -288,6 +493,7 @@ fn a_million_runs_are_planned_counted_and_shared_out_in_a_hundred_megabytes() {
         for arguments in [
             "suite large.toml plan",
             "suite large.toml submit --engine slurm --dry-run",
+            "suite large.toml status --out suite",
             "run-task --suite large.toml --shard 999999/1000000 --out suite",
         ] {
             let peak = peak(&evolver, &words(arguments));
@@ -299,6 +505,8 @@ fn a_million_runs_are_planned_counted_and_shared_out_in_a_hundred_megabytes() {
     }
     let evolver = Evolver::in_empty_folder();
     suite(&evolver, 1_000_000, 1200);
+    let peak = peak(&evolver, &words("suite large.toml plan"));
+    assert!(peak <= 100e6, "{peak:.0} bytes");
     let plan = evolver.run(&["suite", "large.toml", "plan"]);
     assert!(
         plan.stdout.contains("1200000000 different runs"),

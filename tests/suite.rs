@@ -1,5 +1,6 @@
 //! Suites, run as a user would run them: one machine or many, interrupted or not, one result.
 
+use minimal_surprise_evolver::suite::plan::Plan;
 use minimal_surprise_evolver::suite::{Suite, report};
 use minimal_surprise_sim::engine::PATH_VARIABLE;
 use rand_chacha::ChaCha8Rng;
@@ -485,16 +486,70 @@ fn a_file_in_the_way_of_a_suite_is_named() {
     let evolver = with_the_suite();
     evolver.write("suite", b"a file");
     let run = evolver.run(&RUN);
-    assert_ne!(run.code, Some(0), "{run:?}");
-    assert!(run.stderr.contains("suite"), "{run:?}");
+    assert_refused(&run, &["suite"]);
+    fs::remove_file(evolver.folder().join("suite")).unwrap();
+    let elsewhere = [&RUN[..3], &["--out", "/proc/suite"]].concat();
+    assert_refused(&evolver.run(&elsewhere), &["/proc/suite"]);
+    assert_eq!(evolver.run(&RUN).code, Some(0));
+    evolver.write("report", b"a file");
+    let report = ["suite", "own.toml", "report", "--out", "suite"];
+    for to in ["report", "report/in-a-file", "/proc/report"] {
+        let refused = evolver.run(&[&report[..], &["--gallery", "--to", to]].concat());
+        assert_refused(&refused, &[to]);
+    }
+}
+
+#[test]
+fn a_run_whose_lock_cannot_be_opened_is_named_and_the_others_are_done() {
+    let evolver = with_the_suite();
+    assert_eq!(evolver.run(&RUN).code, Some(0));
+    let hashes = evolver.text("suite/hashes.txt");
+    let runs: Vec<&str> = hashes.lines().map(|line| &line[..16]).collect();
+    let at = |run: &str| evolver.folder().join("suite/runs").join(run);
+    fs::remove_file(at(runs[0]).join("DONE")).unwrap();
+    fs::create_dir(at(runs[0]).join(".lock")).unwrap();
+    fs::remove_dir_all(at(runs[5])).unwrap();
+    let run = evolver.run(&RUN);
+    run.assert_failed(&[runs[0], ".lock", "1 left out"]);
+    assert!(run.stdout.contains("\"runs_done\":5,"), "{run:?}");
+    fs::remove_dir_all(at(runs[0])).unwrap();
+    assert_eq!(hashes_after(&evolver), hashes);
+}
+
+/// A suite that searches for what no run of it is named after.
+fn with_a_search() -> Evolver {
+    let evolver = Evolver::in_empty_folder();
+    let text = format!(
+        "{SUITE}\n[[resilience]]\nname = \"damage\"\nof = \"two-grids\"\nstructure = \
+         \"triangular lattice\"\nrobots-in-areas = [2]\nrepeat = 1\nfurther-runs = 2\n"
+    );
+    evolver.write("own.toml", text.as_bytes());
+    evolver
+}
+
+#[test]
+fn a_damaged_run_beyond_the_plan_is_named_and_ends_only_its_search() {
+    let evolver = with_a_search();
+    let suite = Suite::read(&evolver.folder().join("own.toml")).unwrap();
+    let plan = Plan::new(&suite, None, None, false).unwrap();
+    let further = plan.experiments[0].further().next().unwrap();
+    let directory = further.directory(Path::new("suite"));
+    fs::create_dir_all(evolver.folder().join(&directory)).unwrap();
+    evolver.write(&format!("{}/letter", directory.display()), b"dear");
+    let run = evolver.run(&RUN);
+    run.assert_failed(&[&further.id, "1 left out"]);
+    assert!(run.stdout.contains("\"runs_done\":6,"), "{run:?}");
+    assert!(evolver.text("suite/hashes.txt").lines().count() == 6);
 }
 
 #[test]
 fn a_suite_on_a_full_disk_says_so_and_goes_on_when_there_is_room() {
     let evolver = with_the_suite();
     // Bytes enough, so that it is begun, but not for as many files.
-    let Some(disk) = Disk::mounted_at(evolver.folder().join("suite"), "8m,nr_inodes=30") else {
-        println!("skipped: no file system can be mounted here");
+    let Some(disk) = tools::require(Disk::mounted_at(
+        evolver.folder().join("suite"),
+        "8m,nr_inodes=30",
+    )) else {
         return;
     };
     let full = evolver.run(&RUN);
@@ -806,13 +861,12 @@ fn every_key_of_a_suite_is_explained() {
 #[test]
 fn a_suite_in_a_directory_that_is_read_only_says_so_and_what_is_done_can_be_read() {
     let evolver = with_the_suite();
-    let Some(disk) = Disk::mounted_at(evolver.folder().join("suite"), "8m") else {
-        println!("skipped: no file system can be mounted here");
+    let Some(disk) = tools::require(Disk::mounted_at(evolver.folder().join("suite"), "8m")) else {
         return;
     };
     disk.remount("ro");
     let nothing = evolver.run(&RUN);
-    assert_eq!(nothing.code, Some(1), "{nothing:?}");
+    assert_eq!(nothing.code, Some(2), "{nothing:?}");
     for words in ["suite/runs", "Read-only file system"] {
         assert!(nothing.stderr.contains(words), "no {words:?}: {nothing:?}");
     }
@@ -826,11 +880,11 @@ fn a_suite_in_a_directory_that_is_read_only_says_so_and_what_is_done_can_be_read
         "{status:?}"
     );
     let more = evolver.run(&RUN);
-    assert_eq!(more.code, Some(1), "{more:?}");
+    assert_eq!(more.code, Some(2), "{more:?}");
     assert!(more.stderr.contains("Read-only file system"), "{more:?}");
     let report = ["suite", "own.toml", "report", "--out", "suite"];
     let there = evolver.run(&report);
-    assert_eq!(there.code, Some(1), "{there:?}");
+    assert_eq!(there.code, Some(2), "{there:?}");
     assert!(there.stderr.contains("suite/report"), "{there:?}");
     let elsewhere = evolver.run(&[&report[..], &["--to", "report"]].concat());
     assert_eq!(elsewhere.code, Some(0), "{elsewhere:?}");

@@ -6,6 +6,7 @@ use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use tempfile::TempPath;
 
 /// A file or folder could not be used.
@@ -97,8 +98,30 @@ pub fn beside(path: &Path) -> PathBuf {
 /// Whether a name is one of [`beside`], so that nobody is meant to look inside.
 #[must_use]
 pub fn is_part(name: &OsStr) -> bool {
-    let name = name.as_encoded_bytes();
-    name.starts_with(b".") && name.ends_with(PART.as_bytes())
+    let numbers = || {
+        let name = name.to_str()?.strip_prefix('.')?.strip_suffix(PART)?;
+        name.split_once('.')
+    };
+    let is_digit = |byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f');
+    let is_number = |text: &str| text.len() == 16 && text.bytes().all(is_digit);
+    numbers().is_some_and(|(hash, number)| is_number(hash) && is_number(number))
+}
+
+/// Nobody takes so long to write a file.
+const PART_AGE_MAX: Duration = Duration::from_secs(3600);
+
+/// Removes what processes left in a folder that were killed while they wrote a file in it.
+pub fn remove_old_parts(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_old = |metadata: fs::Metadata| {
+            let age = metadata.modified().ok()?.elapsed().ok()?;
+            Some(metadata.is_file() && age > PART_AGE_MAX)
+        };
+        if is_part(&entry.file_name()) && entry.metadata().ok().and_then(is_old) == Some(true) {
+            // Cosmetic: failure to remove it is ignored.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// The directory that a path is in.
@@ -292,6 +315,38 @@ mod tests {
     fn names(folder: &Path) -> Vec<PathBuf> {
         let entries = fs::read_dir(folder).unwrap();
         entries.map(|entry| entry.unwrap().path()).collect()
+    }
+
+    #[test]
+    fn only_names_that_this_program_gives_are_those_of_parts() {
+        assert!(is_part(beside(Path::new("file")).as_os_str()));
+        for name in [
+            ".g.part",
+            ".0123456789abcdef.part",
+            ".0123456789abcdef.0123456789abcde.part",
+            ".0123456789abcdef.0123456789ABCDEF.part",
+            "0123456789abcdef.0123456789abcdef.part",
+            ".0123456789abcdef.0123456789abcdef.0123456789abcdef.part",
+        ] {
+            assert!(!is_part(OsStr::new(name)), "{name}");
+        }
+    }
+
+    #[test]
+    fn of_parts_only_old_files_are_removed() {
+        let scratch = tempfile::tempdir().unwrap();
+        let [young, old, folder] = [(); 3].map(|()| beside(&scratch.path().join("file")));
+        let of_the_user = scratch.path().join(".letter.part");
+        fs::create_dir(&folder).unwrap();
+        let long_ago = std::time::SystemTime::now() - 2 * PART_AGE_MAX;
+        for file in [&young, &old, &of_the_user] {
+            let file = File::create(file).unwrap();
+            file.set_modified(long_ago).unwrap();
+        }
+        fs::write(&young, "text").unwrap();
+        remove_old_parts(scratch.path());
+        assert!(young.exists() && folder.exists() && of_the_user.exists());
+        assert!(!old.exists());
     }
 
     #[test]

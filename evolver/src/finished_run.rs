@@ -368,6 +368,7 @@ pub fn settings_of_run(run: &Path) -> Result<Settings, ReadRunError> {
 
 /// The same with their text, its lines ending with `\n` whatever an editor made of them.
 pub(crate) fn settings_and_text_of_run(run: &Path) -> Result<(Settings, String), ReadRunError> {
+    require(run, CONFIG)?;
     let config = run.join(CONFIG);
     let text = files::read_text(&config, TEXT_BYTES_MAX)?;
     let mut given = Given::default();

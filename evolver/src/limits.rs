@@ -11,6 +11,7 @@ use crate::settings::Settings;
 use indicatif::DecimalBytes;
 use minimal_surprise_controller::{Decision, Genome, SensorBits, State};
 use minimal_surprise_sim::{Pose, Scenario, TraceStep, Trial};
+use std::cmp::Ordering;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System};
@@ -22,44 +23,57 @@ const BLOCK_BYTES: f64 = 4096.0;
 
 /// A command needs more than this machine has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum TooMuch {
-    /// Of memory.
-    #[error(
-        "{setting}: too much for this machine: about {} of memory would be needed, {} of it for \
-         {what}; {} are available", DecimalBytes(*needed), DecimalBytes(*part), DecimalBytes(*available)
-    )]
-    Memory {
-        /// The settings to change.
-        setting: String,
-        /// What takes most.
-        what: &'static str,
-        /// Bytes that takes.
-        part: u64,
-        /// Bytes estimated, of everything.
-        needed: u64,
-        /// Bytes there are.
-        available: u64,
-    },
-    /// Of disk.
-    #[error(
-        "{setting}: too much for this machine: about {} of disk would be needed, {} of it for \
-         {what}; {} are free in {}",
-        DecimalBytes(*needed), DecimalBytes(*part), DecimalBytes(*available), directory.display()
-    )]
-    Disk {
-        /// The settings to change.
-        setting: String,
-        /// What takes most.
-        what: &'static str,
-        /// Bytes that takes.
-        part: u64,
-        /// Bytes estimated, of everything.
-        needed: u64,
-        /// Bytes there are.
-        available: u64,
-        /// Where.
-        directory: PathBuf,
-    },
+#[error(
+    "{setting}: too much for this machine: about {} of {} would be needed, {} of it for {what}; {} \
+     are {}",
+    DecimalBytes(*needed), place.name(), DecimalBytes(*part), DecimalBytes(*available), place.rest()
+)]
+pub struct TooMuch {
+    /// The settings to change.
+    pub setting: String,
+    /// What takes most.
+    pub what: &'static str,
+    /// Bytes that takes.
+    pub part: u64,
+    /// Bytes estimated, of everything.
+    pub needed: u64,
+    /// Bytes there are.
+    pub available: u64,
+    /// Of what.
+    pub place: Place,
+}
+
+/// Where bytes are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// In memory.
+    Memory,
+    /// On the disk that this directory is on, or will be.
+    Disk(PathBuf),
+}
+
+impl Place {
+    const fn name(&self) -> &'static str {
+        match self {
+            Self::Memory => "memory",
+            Self::Disk(_) => "disk",
+        }
+    }
+
+    /// What is said of the bytes that there are.
+    fn rest(&self) -> String {
+        match self {
+            Self::Memory => "available".to_owned(),
+            Self::Disk(directory) => format!("free in {}", directory.display()),
+        }
+    }
+
+    fn available(&self) -> Option<u64> {
+        match self {
+            Self::Memory => memory_available(),
+            Self::Disk(directory) => disk_available(directory),
+        }
+    }
 }
 
 /// Something that takes memory or disk.
@@ -167,29 +181,6 @@ impl Needs {
         }
     }
 
-    /// Runs done one after the other, of which a share, 0 to 1, is still to be done here.
-    #[must_use]
-    pub fn of_runs(runs: impl Iterator<Item = (Settings, u32)>, share: f64, threads: f64) -> Self {
-        let (mut largest, mut finished, mut all) = (Self::default(), 0.0, 0.0);
-        for (settings, number) in runs {
-            let one = Self::of_evolution(&settings, threads);
-            all += f64::from(number);
-            finished += f64::from(number) * finished_bytes(&settings);
-            if total(&one.memory) > total(&largest.memory) {
-                largest.memory = one.memory;
-            }
-            if total(&one.disk) > total(&largest.disk) {
-                largest.disk = one.disk;
-            }
-        }
-        largest.disk.push(Part {
-            bytes: share * finished,
-            what: "the runs to do",
-            setting: format!("{all} runs in the suite"),
-        });
-        largest
-    }
-
     /// A genome from new starts, whose outcomes are kept.
     #[must_use]
     pub fn of_starts<T>(
@@ -198,22 +189,23 @@ impl Needs {
         threads: f64,
     ) -> Self {
         let mut memory = Vec::new();
+        // Which is used for one scenario after the other.
+        let mut worlds = Vec::new();
         for (scenario, _) in scenarios {
             let [robots, cells, _] = world(scenario);
             let outcome = 200.0 + 1.2 * robots * size::<Pose>();
-            let grid = scenario.grid();
             let setting = format!("{key} = {starts} or robots = {}", scenario.robots());
             memory.push(Part {
                 bytes: f64::from(starts) * outcome,
                 what: "the outcomes",
                 setting,
             });
-            memory.push(Part {
-                bytes: threads * (robots * ROBOT_BYTES + cells * 5.0),
-                what: "the robots on their grid",
-                setting: format!("robots = {} or grid = {grid}", scenario.robots()),
-            });
+            worlds.push(swarm(
+                scenario,
+                threads * (robots * ROBOT_BYTES + cells * 5.0),
+            ));
         }
+        memory.extend(worlds.into_iter().max_by(by_bytes));
         Self {
             memory,
             disk: Vec::new(),
@@ -234,18 +226,39 @@ impl Needs {
                     "the states",
                     [("steps", scenario.steps()), ("robots", scenario.robots())],
                 ),
-                Part {
-                    bytes: robots * ROBOT_BYTES + cells * 5.0,
-                    what: "the robots on their grid",
-                    setting: format!(
-                        "robots = {} or grid = {}",
-                        scenario.robots(),
-                        scenario.grid()
-                    ),
-                },
+                swarm(scenario, robots * ROBOT_BYTES + cells * 5.0),
             ],
             disk: Vec::new(),
         }
+    }
+
+    /// A run of which every state is kept, and written as the authors' text.
+    #[must_use]
+    pub fn of_trajectory(scenario: &Scenario) -> Self {
+        let mut needs = Self::of_recording(scenario);
+        let [robots, _, steps] = world(scenario);
+        let digits = |number: f64| number.max(1.0).log10().floor() + 1.0;
+        let grid = scenario.grid();
+        let place = digits(grid.width().into()) + digits(grid.height().into());
+        // The step, the place, the heading, and what is between them.
+        let line = digits(steps) + place + 11.0;
+        let text = part(
+            (steps + 1.0) * robots * line,
+            "the text",
+            [("steps", scenario.steps()), ("robots", scenario.robots())],
+        );
+        needs.memory.push(text.clone());
+        needs.disk.push(text);
+        needs
+    }
+
+    /// The same, so many times at once.
+    #[must_use]
+    pub fn times(mut self, number: f64) -> Self {
+        for part in self.memory.iter_mut().chain(&mut self.disk) {
+            part.bytes *= number;
+        }
+        self
     }
 
     /// A run with a robot in it: what robot 0 decides, there and in the simulation.
@@ -277,24 +290,7 @@ impl Needs {
     /// # Errors
     /// [`TooMuch`] names the settings to change.
     pub fn check_memory(&self) -> Result<(), TooMuch> {
-        let needed = self.memory() as u64;
-        match (memory_available(), largest(&self.memory)) {
-            (
-                Some(available),
-                Some(Part {
-                    bytes,
-                    what,
-                    setting,
-                }),
-            ) if needed > available => Err(TooMuch::Memory {
-                setting: setting.clone(),
-                what,
-                part: *bytes as u64,
-                needed,
-                available,
-            }),
-            _ => Ok(()),
-        }
+        check(&self.memory, Place::Memory)
     }
 
     /// Whether the disk that a directory is on, or will be, has the room.
@@ -302,25 +298,7 @@ impl Needs {
     /// # Errors
     /// [`TooMuch`] names the settings to change.
     pub fn check_disk(&self, directory: &Path) -> Result<(), TooMuch> {
-        let needed = self.disk() as u64;
-        match (disk_available(directory), largest(&self.disk)) {
-            (
-                Some(available),
-                Some(Part {
-                    bytes,
-                    what,
-                    setting,
-                }),
-            ) if needed > available => Err(TooMuch::Disk {
-                setting: setting.clone(),
-                what,
-                part: *bytes as u64,
-                needed,
-                available,
-                directory: directory.to_owned(),
-            }),
-            _ => Ok(()),
-        }
+        check(&self.disk, Place::Disk(directory.to_owned()))
     }
 
     /// A line for who would be surprised by what is going to be used; none if that is little.
@@ -331,6 +309,91 @@ impl Needs {
             let [memory, disk] = [memory, disk].map(|bytes| DecimalBytes(bytes as u64));
             format!("about {memory} of memory and {disk} of disk are needed")
         })
+    }
+}
+
+/// What runs take that are done one after the other.
+#[derive(Clone, Debug, Default)]
+pub struct NeedsOfRuns {
+    /// Of memory, and of disk until it is complete, what the largest run takes.
+    largest: Needs,
+    runs: u64,
+    /// Bytes of disk that all leave, and the largest.
+    left: f64,
+    left_most: f64,
+}
+
+impl NeedsOfRuns {
+    /// So many runs under these settings.
+    pub fn add(&mut self, settings: &Settings, runs: u64, threads: f64) {
+        if runs == 0 {
+            return;
+        }
+        let Needs { memory, disk } = Needs::of_evolution(settings, threads);
+        let left = finished_bytes(settings);
+        self.runs += runs;
+        self.left += runs as f64 * left;
+        self.left_most = self.left_most.max(left);
+        let largest = std::mem::take(&mut self.largest);
+        self.largest = Needs {
+            memory: larger(memory, largest.memory),
+            disk: larger(disk, largest.disk),
+        };
+    }
+
+    /// What they take.
+    #[must_use]
+    pub fn needs(&self) -> Needs {
+        let mut needs = self.largest.clone();
+        needs.disk.push(self.files(self.left));
+        needs
+    }
+
+    /// What they take of disk at least, if so many of them are done.
+    #[must_use]
+    pub fn at_least_without(&self, done: u64) -> Needs {
+        let left = (self.left - done as f64 * self.left_most).max(0.0);
+        Needs {
+            memory: Vec::new(),
+            disk: vec![self.files(left)],
+        }
+    }
+
+    fn files(&self, bytes: f64) -> Part {
+        Part {
+            bytes,
+            what: "their files",
+            setting: format!("{} runs to do", self.runs),
+        }
+    }
+}
+
+/// Whether the bytes of all parts are there.
+fn check(parts: &[Part], place: Place) -> Result<(), TooMuch> {
+    let needed = total(parts) as u64;
+    match (
+        place.available(),
+        parts.iter().max_by(|one, other| by_bytes(one, other)),
+    ) {
+        (Some(available), Some(largest)) if needed > available => Err(TooMuch {
+            setting: largest.setting.clone(),
+            what: largest.what,
+            part: largest.bytes as u64,
+            needed,
+            available,
+            place,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Robots on their grid.
+fn swarm(scenario: &Scenario, bytes: f64) -> Part {
+    let (robots, grid) = (scenario.robots(), scenario.grid());
+    Part {
+        bytes,
+        what: "the robots on their grid",
+        setting: format!("robots = {robots} or grid = {grid}"),
     }
 }
 
@@ -347,8 +410,16 @@ fn total(parts: &[Part]) -> f64 {
     parts.iter().map(|part| part.bytes).sum()
 }
 
-fn largest(parts: &[Part]) -> Option<&Part> {
-    parts.iter().max_by(|a, b| a.bytes.total_cmp(&b.bytes))
+fn larger(one: Vec<Part>, other: Vec<Part>) -> Vec<Part> {
+    if total(&one) > total(&other) {
+        one
+    } else {
+        other
+    }
+}
+
+fn by_bytes(one: &Part, other: &Part) -> Ordering {
+    one.bytes.total_cmp(&other.bytes)
 }
 
 /// Robots, cells and steps.

@@ -24,9 +24,17 @@ impl NewDir {
     /// [`FileError`] if there is something in that place ([`FileError::is_exists`]), or it cannot
     /// be made.
     pub fn beside(place: &Path) -> Result<Self, FileError> {
+        refuse_existing(place)?;
+        Self::unchecked_beside(place)
+    }
+
+    /// [`NewDir::beside`], also if something has appeared in that place: publishing fails then.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be made.
+    pub fn unchecked_beside(place: &Path) -> Result<Self, FileError> {
         let parent = files::parent(place);
         fs::create_dir_all(parent).map_err(FileError::at(parent))?;
-        refuse_existing(place)?;
         loop {
             let part = files::beside(place);
             fs::create_dir(&part).map_err(FileError::at(place))?;

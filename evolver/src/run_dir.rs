@@ -22,6 +22,7 @@ use crate::lock::{self, Holder, LOCK, Lock, LockError};
 use crate::new_dir::NewDir;
 use crate::report::tables;
 use crate::run_files::{BEST, CHECKPOINT, CONFIG, DONE, FINAL, GENERATIONS, META, TIME};
+use crate::settings::Settings;
 use crate::time_spent::{TimeSpent, Timer};
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
 use minimal_surprise_sim::engine::PathError;
@@ -66,7 +67,7 @@ pub enum RunDirError {
         /// The file that it should have.
         missing: &'static str,
     },
-    /// The run is marked complete, and is not.
+    /// A file of it cannot be read back.
     #[error(transparent)]
     Damaged(#[from] ReadRunError),
     /// Another process works on the run.
@@ -103,6 +104,20 @@ impl RunDirError {
         match self {
             Self::Damaged(error) => error.cause(),
             other => other,
+        }
+    }
+
+    /// Whether it is about this run alone, so that others can be done all the same: not a disk that
+    /// is full, a folder that no run can be made in, or what this machine has not.
+    #[must_use]
+    pub fn is_of_one_run(&self, run: &Path) -> bool {
+        match self {
+            Self::File(file) => {
+                let inside = file.path.starts_with(run) && file.path != run;
+                inside && file.is_bad_path() && file.error.kind() != ErrorKind::ReadOnlyFilesystem
+            }
+            Self::EnginePath(_) | Self::TooMuch(_) => false,
+            _ => true,
         }
     }
 }
@@ -163,11 +178,12 @@ impl RunDir {
         Err(RunDirError::Exists(parent.join(name)))
     }
 
-    /// Opens a run to go on with it.
+    /// Opens a run to go on with it on so many threads.
     ///
     /// # Errors
-    /// [`RunDirError`] if there is no run, it is in use, or it was changed or damaged.
-    pub fn open(path: &Path) -> Result<Found, RunDirError> {
+    /// [`RunDirError`] if there is no run, it is in use, it was changed or damaged, or it takes more
+    /// than this machine has.
+    pub fn open(path: &Path, threads: f64) -> Result<Found, RunDirError> {
         let missing = |missing| RunDirError::NotARun {
             path: path.to_owned(),
             missing,
@@ -186,7 +202,9 @@ impl RunDir {
         if let Some(hash) = finished(path)? {
             return Ok(Found::Finished(hash));
         }
-        let (experiment, settings_text, spent) = unfinished(path)?;
+        let (settings, settings_text) = settings_of_unfinished(path)?;
+        Needs::of_evolution(&settings, threads).check_memory()?;
+        let (experiment, spent) = unfinished(path, settings, &settings_text)?;
         let run = Self {
             path: path.to_owned(),
             settings_text,
@@ -197,12 +215,17 @@ impl RunDir {
         Ok(Found::Unfinished(Box::new(experiment), run))
     }
 
-    /// Whether a run that is not complete can be gone on with.
+    /// Whether a run that is not complete can be gone on with, where there is the memory for it.
     ///
     /// # Errors
     /// [`RunDirError`] if it cannot.
     pub fn check_unfinished(path: &Path) -> Result<(), RunDirError> {
-        unfinished(path).map(drop)
+        let (settings, text) = settings_of_unfinished(path)?;
+        if Needs::of_evolution(&settings, 1.0).check_memory().is_err() {
+            // It is not damaged only because it cannot be held here.
+            return Ok(());
+        }
+        unfinished(path, settings, &text).map(drop)
     }
 
     /// For a run that others may be doing at the same time, unseen where the file system knows no
@@ -277,26 +300,33 @@ impl RunDir {
     }
 }
 
-/// What a run that is not complete goes on from.
-fn unfinished(path: &Path) -> Result<(Experiment, String, TimeSpent), RunDirError> {
-    let checkpoint = path.join(CHECKPOINT);
-    if !files::exists(&checkpoint)? {
+/// The settings of a run that is not complete, and their text.
+fn settings_of_unfinished(path: &Path) -> Result<(Settings, String), RunDirError> {
+    if !files::exists(&path.join(CHECKPOINT))? {
         return Err(RunDirError::NotARun {
             path: path.to_owned(),
             missing: CHECKPOINT,
         });
     }
-    let (settings, text) = settings_and_text_of_run(path)?;
-    Needs::of_evolution(&settings, limits::threads(None)).check_memory()?;
+    Ok(settings_and_text_of_run(path)?)
+}
+
+/// What a run that is not complete goes on from.
+fn unfinished(
+    path: &Path,
+    settings: Settings,
+    text: &str,
+) -> Result<(Experiment, TimeSpent), RunDirError> {
+    let checkpoint = path.join(CHECKPOINT);
     let most = limits::most(limits::checkpoint_bytes(&settings));
     let bytes = files::read(&checkpoint, most).map_err(ReadRunError::from)?;
     let experiment =
-        checkpoint::decode(&bytes, settings, &text).map_err(|error| RunDirError::Checkpoint {
+        checkpoint::decode(&bytes, settings, text).map_err(|error| RunDirError::Checkpoint {
             path: checkpoint,
             error,
         })?;
     let spent = TimeSpent::read(path).map_err(ReadRunError::from)?;
-    Ok((experiment, text, spent))
+    Ok((experiment, spent))
 }
 
 /// The hash of a complete run; what is not needed any more is removed.
@@ -311,7 +341,10 @@ fn finished(directory: &Path) -> Result<Option<String>, RunDirError> {
 
 /// Removes what a complete run does not need: checkpoint, lock, and files whose writing was cut
 /// short. Another process may be removing them, too.
-fn tidy(directory: &Path) -> Result<(), FileError> {
+///
+/// # Errors
+/// [`FileError`] if something cannot be removed.
+pub fn tidy(directory: &Path) -> Result<(), FileError> {
     let entries = fs::read_dir(directory).map_err(FileError::at(directory))?;
     for entry in entries.flatten() {
         let name = entry.file_name();

@@ -1,5 +1,6 @@
 //! File systems of a test's own.
 
+use crate::tools::Missing;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,28 +10,38 @@ use std::process::Command;
 pub struct Disk(PathBuf);
 
 impl Disk {
-    /// An empty file system as large as it is made. Only a privileged process gets one.
+    /// An empty file system as large as it is made.
+    ///
+    /// # Errors
+    /// [`Missing`] if this process is not privileged.
     ///
     /// # Panics
     /// If there can be no folder of that name.
-    #[must_use]
-    pub fn mounted_at(path: PathBuf, size: &str) -> Option<Self> {
+    pub fn mounted_at(path: PathBuf, size: &str) -> Result<Self, Missing> {
         fs::create_dir_all(&path).expect("a folder");
         let size = format!("size={size}");
         let options = ["-t", "tmpfs", "-o", &size, "tmpfs"].map(Path::new);
         Self::mounted(path, &options)
     }
 
-    /// A file in the place of another one. Only a privileged process gets that.
-    #[must_use]
-    pub fn bound(file: &Path, path: PathBuf) -> Option<Self> {
+    /// A file in the place of another one.
+    ///
+    /// # Errors
+    /// [`Missing`] if this process is not privileged.
+    pub fn bound(file: &Path, path: PathBuf) -> Result<Self, Missing> {
         Self::mounted(path, &[Path::new("--bind"), file])
     }
 
-    fn mounted(path: PathBuf, options: &[&Path]) -> Option<Self> {
+    fn mounted(path: PathBuf, options: &[&Path]) -> Result<Self, Missing> {
         let mounted = Command::new("mount").args(options).arg(&path).output();
         let mounted = mounted.is_ok_and(|output| output.status.success());
-        mounted.then(|| Self(path))
+        let missing =
+            || Missing("mounting: it needs root, as in a container of its own".to_owned());
+        if mounted {
+            Ok(Self(path))
+        } else {
+            Err(missing())
+        }
     }
 
     /// Mounts it with another option.

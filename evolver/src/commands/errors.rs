@@ -9,6 +9,8 @@ use crate::replay::gallery::GalleryError;
 use crate::run_dir::RunDirError;
 use crate::run_files::DONE;
 use crate::settings::SettingError;
+use crate::suite::report::ReportError;
+use crate::suite::slurm::SubmitError;
 use crate::text::shell_path;
 
 /// Input that cannot be used, in one message.
@@ -141,10 +143,26 @@ impl AboutInput for RunDirError {
 impl AboutInput for GalleryError {
     fn is_bad_input(&self) -> bool {
         match self {
-            Self::Empty(_) | Self::Exists(_) | Self::Page { .. } => true,
+            Self::Empty(_) | Self::Exists(_) | Self::Page { .. } | Self::TooMuch(_) => true,
             Self::Run(error) => error.is_bad_input(),
             Self::File(error) => error.is_bad_input(),
             Self::World { .. } | Self::Damaged(_) => false,
+        }
+    }
+}
+
+impl AboutInput for ReportError {
+    fn is_bad_input(&self) -> bool {
+        matches!(self, Self::File(error) if error.is_bad_input())
+    }
+}
+
+impl AboutInput for SubmitError {
+    fn is_bad_input(&self) -> bool {
+        match self {
+            Self::UnusablePath(_) => true,
+            Self::File(error) => error.is_bad_input(),
+            Self::NoSbatch(_) | Self::Refused { .. } => false,
         }
     }
 }

@@ -162,26 +162,28 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
     };
     let stop = stop_on_signal()?;
     let (experiment, run) = match &arguments.resume {
-        Some(directory) => match RunDir::open(directory).map_err(unusable)? {
-            Found::Unfinished(experiment, run) => (*experiment, run),
-            Found::Finished(hash) => {
-                // All of it, or a damaged one would be called complete.
-                FinishedRun::read_and_check(directory).map_err(unusable)?;
-                if arguments.progress == ProgressMode::Json {
-                    let done = serde_json::json!({"event": "done", "hash": hash, "run": text_of_path(directory)});
-                    show_line!("{done}");
-                } else {
-                    show_line!(
-                        "{} is complete; its hash is {hash}",
-                        terminal_path(directory)
-                    );
+        Some(directory) => {
+            match RunDir::open(directory, limits::threads(threads)).map_err(unusable)? {
+                Found::Unfinished(experiment, run) => (*experiment, run),
+                Found::Finished(hash) => {
+                    // All of it, or a damaged one would be called complete.
+                    FinishedRun::read_and_check(directory).map_err(unusable)?;
+                    if arguments.progress == ProgressMode::Json {
+                        let done = serde_json::json!({"event": "done", "hash": hash, "run": text_of_path(directory)});
+                        show_line!("{done}");
+                    } else {
+                        show_line!(
+                            "{} is complete; its hash is {hash}",
+                            terminal_path(directory)
+                        );
+                    }
+                    return match arguments.open {
+                        true => watch(directory, stop),
+                        false => Ok(Exit::Done),
+                    };
                 }
-                return match arguments.open {
-                    true => watch(directory, stop),
-                    false => Ok(Exit::Done),
-                };
             }
-        },
+        }
         None => {
             let settings = Settings::resolve(&given, draw_seed).map_err(BadInput::new)?;
             let seed = settings.seed;

@@ -127,9 +127,11 @@ fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
         .into());
     }
     let finished = FinishedRun::read_and_check(&arguments.from).map_err(unusable)?;
-    Needs::of_recording(&finished.settings.scenario)
-        .check_memory()
-        .map_err(BadInput::new)?;
+    let needs = Needs::of_trajectory(&finished.settings.scenario);
+    needs.check_memory().map_err(BadInput::new)?;
+    if let Some(out) = &arguments.out {
+        needs.check_disk(out).map_err(BadInput::new)?;
+    }
     let trace = finished.trace()?;
     let grid = finished.settings.scenario.grid();
     let mut text = Vec::new();

@@ -40,6 +40,9 @@ pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
         0 => String::new(),
         n => format!("; {n} that have not ended left out"),
     };
+    if written.by_another {
+        tell!("another process has written the same gallery meanwhile");
+    }
     show_line!(
         "{} ({} runs, {:.1} MB{left_out})",
         terminal_path(&written.index),

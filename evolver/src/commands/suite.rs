@@ -1,21 +1,22 @@
 //! `evolver paper` and `evolver suite FILE`: many evolutions, on one machine or many.
 
-use super::errors::{Unfinished, name_damaged, stopped};
+use super::errors::{Unfinished, name_damaged, stopped, unusable};
 use super::{BadInput, flag, thread_pool, threads_flag};
 use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
-use crate::files::{self, Existing, TEXT_BYTES_MAX};
-use crate::finished_run::Progress;
-use crate::limits::{self, Needs};
+use crate::files::{self, Existing, FileError, TEXT_BYTES_MAX};
+use crate::finished_run::{Progress, ReadRunError};
+use crate::limits::{self, Needs, NeedsOfRuns};
+use crate::lock::Holder;
 use crate::new_dir::remove_abandoned;
 use crate::replay::gallery;
 use crate::report::progress::ProgressMode;
 use crate::report::suite_progress::{SearchProgress, SuiteProgress, robot_steps};
-use crate::run_dir::{Found, RunDir, RunDirError};
+use crate::run_dir::{RunDir, tidy};
 use crate::settings::count;
 use crate::signals::stop_on_signal;
 use crate::suite::plan::{Plan, PlannedRun, RUNS, Runs};
-use crate::suite::report;
+use crate::suite::report::{self, gather::Gathered};
 use crate::suite::search::{Search, look};
 use crate::suite::work::{Shard, Waiting, Worked, progress, work_on};
 use crate::suite::{PAPER, Resilience, Suite, slurm};
@@ -24,6 +25,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use minimal_surprise_sim::Path as CodePath;
 use sha2::{Digest, Sha256};
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -242,7 +244,7 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
         }
         Verb::Report { to, gallery, .. } => {
             let out = to.clone().unwrap_or_else(|| directory.join("report"));
-            if !report::may_be_written(&out)? {
+            if !report::may_be_written(&out).map_err(unusable)? {
                 return Err(BadInput::new(format!(
                     "{}: it is not marked as a report that may be replaced (an earlier version set \
                      no mark); name a new directory with --to",
@@ -250,10 +252,13 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
                 ))
                 .into());
             }
-            let (finished, mut damaged) = finished(plan.runs(), &directory);
+            let needs = needs_of_report(&plan, &read.suite);
+            needs.check_memory().map_err(BadInput::new)?;
             let again = command(read, choice, &directory);
-            if finished.is_empty() && !damaged.is_empty() {
-                return Ok(name_damaged(&damaged, Some(&again)));
+            let gathered = Gathered::read(&plan, &read.suite, &directory).map_err(unusable)?;
+            let finished = gathered.directories(&directory);
+            if finished.is_empty() && !gathered.damaged.is_empty() {
+                return Ok(name_damaged(&gathered.damaged, Some(&again)));
             }
             if finished.is_empty() {
                 return Err(BadInput::new(format!(
@@ -263,11 +268,12 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
                 ))
                 .into());
             }
+            let mut damaged = gathered.damaged.clone();
             if *gallery {
                 damaged.extend(write_gallery(&finished, &out.join(report::GALLERY))?);
             }
-            let written = report::write(&plan, &read.suite, &directory, &out, &read.called)?;
-            damaged.extend(written.damaged);
+            let written =
+                report::write(&gathered, &read.suite, &out, &read.called).map_err(unusable)?;
             show_line!(
                 "{} of {} runs; {}",
                 written.finished,
@@ -308,13 +314,10 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
                 },
                 flags: flags(choice),
             };
-            let unusable = |error| match error {
-                slurm::SubmitError::UnusablePath(_) => BadInput::new(error).into(),
-                other => anyhow::Error::from(other),
-            };
             if !*dry_run {
                 // Memory is that of the machines that the tasks run on.
-                let needs = needs(&plan, plan.runs(), &directory, 1.0);
+                let to_do = ToDo::of(plan.runs(), &directory, 1.0, &mut DamagedRuns::default())?;
+                let needs = to_do.needs.needs();
                 needs.check_disk(&directory).map_err(BadInput::new)?;
             }
             if *dry_run {
@@ -327,12 +330,34 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
     Ok(Exit::Done)
 }
 
+/// The most that anything takes that a report runs again.
+fn needs_of_report(plan: &Plan, suite: &Suite) -> Needs {
+    let mut most = Needs::default();
+    for experiment in &plan.experiments {
+        let of_it = |of: &String| *of == experiment.name;
+        let again = suite.reevaluations.iter();
+        let again = again.filter(|asked| asked.of.iter().any(of_it));
+        let damage = suite.resiliences.iter().filter(|asked| of_it(&asked.of));
+        let starts = again.map(|asked| ("starts", asked.starts));
+        let starts: Vec<_> = starts
+            .chain(damage.map(|asked| ("repeat", asked.repeat)))
+            .collect();
+        for settings in experiment.settings().filter(|_| !starts.is_empty()) {
+            let scenario = [(settings.settings.scenario, ())];
+            for &starts in &starts {
+                let needs = Needs::of_starts(&scenario, starts, limits::threads(None));
+                if needs.memory() > most.memory() {
+                    most = needs;
+                }
+            }
+        }
+    }
+    most
+}
+
 /// The gallery of a plan's finished runs; an earlier one is replaced.
 fn write_gallery(finished: &[PathBuf], out: &Path) -> anyhow::Result<DamagedRuns> {
-    if let Some(parent) = out.parent() {
-        fs::create_dir_all(parent).map_err(files::FileError::at(parent))?;
-    }
-    let written = gallery::write(finished, out, Existing::Replace)?;
+    let written = gallery::write(finished, out, Existing::Replace).map_err(unusable)?;
     show_line!(
         "{} runs, {:.1} MB; {}",
         written.runs,
@@ -340,16 +365,6 @@ fn write_gallery(finished: &[PathBuf], out: &Path) -> anyhow::Result<DamagedRuns
         terminal_path(&written.index)
     );
     Ok(written.damaged)
-}
-
-/// The directories of the runs that are done, and the damaged ones.
-fn finished(runs: Runs<'_>, directory: &Path) -> (Vec<PathBuf>, DamagedRuns) {
-    let mut damaged = DamagedRuns::default();
-    let directories = runs.iter().map(|run| run.directory(directory));
-    let finished = directories
-        .filter(|run| damaged.read(run).is_some())
-        .collect();
-    (finished, damaged)
 }
 
 /// The choice of runs as flags, for tasks.
@@ -433,9 +448,11 @@ fn print_plan(plan: &Plan, suite: &Suite, searches: &[Resilience]) {
         }
     }
     let robot_steps: f64 = plan
+        .runs()
         .by_settings()
-        .map(|(settings, runs)| {
-            let generations = f64::from(settings.generations) * f64::from(runs);
+        .map(|alike| {
+            let settings = alike.settings();
+            let generations = f64::from(settings.generations) * alike.number() as f64;
             settings.robot_steps_per_generation() as f64 * generations
         })
         .sum();
@@ -469,13 +486,13 @@ fn check_begun(run: &PlannedRun, suite: &Path, damaged: &mut DamagedRuns) {
 }
 
 /// Shows how many runs are done, and gives the damaged ones back.
-fn print_status(plan: &Plan, directory: &Path) -> Result<DamagedRuns, RunDirError> {
+fn print_status(plan: &Plan, directory: &Path) -> Result<DamagedRuns, ReadRunError> {
     let mut damaged = DamagedRuns::default();
     let (runs, mut hash, mut done) = (plan.runs(), Sha256::new(), 0);
     each_hash(runs, directory, &mut damaged, |line| {
         hash.update(line);
         done += 1;
-    })?;
+    });
     for experiment in &plan.experiments {
         show_line!("{}", experiment.name);
         for settings in experiment.settings() {
@@ -561,16 +578,61 @@ fn print_searches(
     }
 }
 
-/// What some runs of a plan take, less those whose directories are there.
-fn needs(plan: &Plan, runs: Runs<'_>, directory: &Path, threads: f64) -> Needs {
-    let all = plan.runs().number().max(1) as f64;
-    let there = fs::read_dir(directory.join("runs")).map_or(0, Iterator::count) as f64;
-    let left = (1.0 - there / all).max(0.0);
-    Needs::of_runs(
-        plan.by_settings(),
-        left * runs.number() as f64 / all,
-        threads,
-    )
+/// What is to be done of some runs, by a look at their files.
+struct ToDo {
+    /// Of each run, whether it is to be done.
+    each: Vec<bool>,
+    number: u64,
+    robot_steps: u64,
+    needs: NeedsOfRuns,
+}
+
+impl ToDo {
+    /// Looks at the files; a damaged run is not to be done.
+    ///
+    /// # Errors
+    /// [`BadInput`] if they have no folder to be in, or the disk holds them not even nearly, before
+    /// billions are looked at.
+    fn of(
+        runs: Runs<'_>,
+        suite: &Path,
+        threads: f64,
+        damaged: &mut DamagedRuns,
+    ) -> anyhow::Result<Self> {
+        let mut all = NeedsOfRuns::default();
+        for alike in runs.by_settings() {
+            all.add(alike.settings(), alike.number(), threads);
+        }
+        let folder = suite.join(RUNS);
+        let there = match fs::read_dir(&folder) {
+            Ok(there) => there.count() as u64,
+            Err(error) if error.kind() == ErrorKind::NotFound => 0,
+            Err(error) => return Err(unusable(FileError::at(&folder)(error))),
+        };
+        let at_least = all.at_least_without(there);
+        at_least.check_disk(suite).map_err(BadInput::new)?;
+        let mut to_do = Self {
+            each: Vec::new(),
+            number: 0,
+            robot_steps: 0,
+            needs: NeedsOfRuns::default(),
+        };
+        for alike in runs.by_settings() {
+            let before = to_do.number;
+            let settings = alike.settings().clone();
+            for run in alike.runs() {
+                let looked = damaged.take(&run.directory(suite), progress(&run, suite));
+                let waits = looked.is_some_and(|progress| progress != Progress::Done);
+                to_do.each.push(waits);
+                if waits {
+                    to_do.number += 1;
+                    to_do.robot_steps = to_do.robot_steps.saturating_add(robot_steps(&run));
+                }
+            }
+            to_do.needs.add(&settings, to_do.number - before, threads);
+        }
+        Ok(to_do)
+    }
 }
 
 /// Which of the runs.
@@ -607,20 +669,28 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     // What `evolve` refuses, too, before anything is done.
     CodePath::from_environment().map_err(BadInput::new)?;
     let runs = shard.of_plan(plan);
-    let needs = needs(plan, runs, directory, limits::threads(threads));
+    let mut damaged = DamagedRuns::default();
+    let to_do = ToDo::of(runs, directory, limits::threads(threads), &mut damaged)?;
+    let needs = to_do.needs.needs();
     needs.check_memory().map_err(BadInput::new)?;
     needs.check_disk(directory).map_err(BadInput::new)?;
-    let stop = stop_on_signal()?;
-    let pool = thread_pool(threads)?;
-    let mut damaged = DamagedRuns::default();
+    let mut worker = Worker {
+        plan,
+        directory,
+        mode: manner.progress,
+        stop: stop_on_signal()?,
+        damaged,
+        begun: false,
+    };
     remove_abandoned(&directory.join(RUNS));
-    let mut worked =
-        pool.install(|| do_all(plan, runs, directory, manner.progress, stop, &mut damaged))?;
-    for asked in to_search {
-        worked = worked
-            && pool
-                .install(|| search(plan, asked, directory, manner.progress, stop, &mut damaged))?;
-    }
+    let worked = thread_pool(threads)?.install(|| -> anyhow::Result<bool> {
+        let mut worked = worker.do_all(runs, &to_do)?;
+        for asked in to_search {
+            worked = worked && worker.search(asked)?;
+        }
+        Ok(worked)
+    })?;
+    let mut damaged = worker.damaged;
     if !worked {
         return match work.share {
             Share::Whole => stopped(&command(work.read, work.choice, directory)),
@@ -638,10 +708,10 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
             hashes.extend(line.as_bytes());
         }
         done += 1;
-    })?;
+    });
     let all_done = done == runs.number();
     if all_done && work.choice.is_whole() {
-        fs::create_dir_all(directory).map_err(files::FileError::at(directory))?;
+        fs::create_dir_all(directory).map_err(FileError::at(directory))?;
         files::replace(&directory.join(shard.hashes_file()), &hashes)?;
     }
     // A share's would be one that no other number of shares gives.
@@ -705,64 +775,96 @@ fn search_by(work: &Work) -> Option<String> {
     needed.then(|| command(read, choice, directory))
 }
 
-/// Whether a run is still to be done; a damaged one is not.
-fn waits(run: &PlannedRun, suite: &Path, damaged: &mut DamagedRuns) -> bool {
-    let looked = damaged.take(&run.directory(suite), progress(run, suite));
-    looked.is_some_and(|progress| progress != Progress::Done)
+/// Does runs one after the other.
+struct Worker<'a> {
+    plan: &'a Plan,
+    directory: &'a Path,
+    mode: ProgressMode,
+    stop: &'a AtomicBool,
+    damaged: DamagedRuns,
+    /// Whether anything was done.
+    begun: bool,
 }
 
-/// Does what is not done, and waits for what other processes do; false if interrupted.
-fn do_all(
-    plan: &Plan,
-    runs: Runs<'_>,
-    directory: &Path,
-    mode: ProgressMode,
-    stop: &AtomicBool,
-    damaged: &mut DamagedRuns,
-) -> anyhow::Result<bool> {
-    let (mut to_do, mut to_work) = (Vec::new(), 0_u64);
-    for run in runs.iter() {
-        let waits = waits(&run, directory, damaged);
-        to_do.push(waits);
-        if waits {
-            to_work = to_work.saturating_add(robot_steps(&run));
+/// Runs that other processes work on.
+type Held = Vec<(PlannedRun, Option<Holder>)>;
+
+impl Worker<'_> {
+    /// Works on a run; none if something is wrong with this run alone, which is then known as
+    /// damaged.
+    fn work_on(
+        &mut self,
+        run: &PlannedRun,
+        mut each_generation: impl FnMut(u32),
+    ) -> anyhow::Result<Option<Worked>> {
+        let directory = run.directory(self.directory);
+        let worked = work_on(run, self.directory, self.stop, |generation| {
+            self.begun = true;
+            each_generation(generation);
+        });
+        match worked {
+            Ok(worked) => {
+                self.begun |= worked == Worked::Completed;
+                Ok(Some(worked))
+            }
+            Err(error) if error.is_of_one_run(&directory) => {
+                self.damaged.add(&directory, error.cause());
+                Ok(None)
+            }
+            Err(error) if self.begun => Err(error.into()),
+            Err(error) => Err(unusable(error)),
         }
     }
-    let left = to_do.iter().filter(|waits| **waits).count();
-    let shown = SuiteProgress::start(mode, plan, runs.number(), left as u64, to_work);
-    let mut all = || -> anyhow::Result<bool> {
-        let mut waiting = Waiting::new();
-        let mut work = |run: PlannedRun, held: &mut Vec<_>| -> anyhow::Result<bool> {
-            shown.begins(&run);
-            let each_generation = |generation| shown.generation(&run, generation);
-            match work_on(&run, directory, stop, each_generation) {
-                Ok(Worked::Completed) => shown.completed(&run),
-                Ok(Worked::Held(holder)) => held.push((run, holder)),
-                Ok(Worked::Interrupted) => return Ok(false),
-                // A disk that is full is not the fault of one run.
-                Err(error) if !matches!(error, RunDirError::File(_)) => {
-                    damaged.add(&run.directory(directory), error.cause());
-                }
-                Err(error) => return Err(error.into()),
-            }
-            Ok(true)
-        };
-        let mut held = Vec::new();
-        for (run, _) in runs.iter().zip(&to_do).filter(|(_, waits)| **waits) {
-            if !work(run, &mut held)? {
+
+    /// [`Worker::work_on`], shown; false if interrupted.
+    fn do_one(
+        &mut self,
+        run: PlannedRun,
+        shown: &SuiteProgress<'_>,
+        held: &mut Held,
+    ) -> anyhow::Result<bool> {
+        shown.begins(&run);
+        match self.work_on(&run, |generation| shown.generation(&run, generation))? {
+            Some(Worked::Completed) => shown.completed(&run),
+            Some(Worked::Held(holder)) => held.push((run, holder)),
+            Some(Worked::Interrupted) => return Ok(false),
+            None => {}
+        }
+        Ok(true)
+    }
+
+    /// Does what is to be done, and waits for what other processes do; false if interrupted.
+    fn do_all(&mut self, runs: Runs<'_>, to_do: &ToDo) -> anyhow::Result<bool> {
+        let (number, left) = (to_do.number, to_do.robot_steps);
+        let shown = SuiteProgress::start(self.mode, self.plan, runs.number(), number, left);
+        let ended = self.do_all_shown(runs, to_do, &shown);
+        shown.end();
+        ended
+    }
+
+    fn do_all_shown(
+        &mut self,
+        runs: Runs<'_>,
+        to_do: &ToDo,
+        shown: &SuiteProgress<'_>,
+    ) -> anyhow::Result<bool> {
+        let mut held = Held::new();
+        for (run, _) in runs.iter().zip(&to_do.each).filter(|(_, waits)| **waits) {
+            if !self.do_one(run, shown, &mut held)? {
                 return Ok(false);
             }
         }
+        let mut waiting = Waiting::new();
         while let Some((run, holder)) = held.first() {
-            if stop.load(Ordering::Relaxed) {
+            if self.stop.load(Ordering::Relaxed) {
                 return Ok(false);
             }
             waiting.wait_for(run, || {
-                shown.waits(run, &run.directory(directory), holder.as_ref());
+                shown.waits(run, &run.directory(self.directory), holder.as_ref());
             });
             let number = held.len();
             for (run, _) in std::mem::take(&mut held) {
-                if !work(run, &mut held)? {
+                if !self.do_one(run, shown, &mut held)? {
                     return Ok(false);
                 }
             }
@@ -771,47 +873,45 @@ fn do_all(
             }
         }
         Ok(true)
-    };
-    let ended = all();
-    shown.end();
-    ended
-}
+    }
 
-/// Evolves on until a run has the structure that an experiment is about; false if interrupted.
-fn search(
-    plan: &Plan,
-    asked: &Resilience,
-    directory: &Path,
-    mode: ProgressMode,
-    stop: &AtomicBool,
-    damaged: &mut DamagedRuns,
-) -> anyhow::Result<bool> {
-    let shown = SearchProgress::start(mode, &asked.name);
-    let (mut after, mut begun) = (0, 0);
-    let mut waiting = Waiting::new();
-    let ended = loop {
-        let Search::Next(run, number) = look(plan, asked, directory, after, damaged) else {
-            break true;
-        };
-        if damaged.contains(&run.directory(directory)) {
-            break true;
+    /// Evolves on until a run has the structure that an experiment is about; false if interrupted.
+    fn search(&mut self, asked: &Resilience) -> anyhow::Result<bool> {
+        let shown = SearchProgress::start(self.mode, &asked.name);
+        let ended = self.search_shown(asked, &shown);
+        shown.end();
+        ended
+    }
+
+    fn search_shown(&mut self, asked: &Resilience, shown: &SearchProgress) -> anyhow::Result<bool> {
+        let (mut after, mut begun) = (0, 0);
+        let mut waiting = Waiting::new();
+        loop {
+            let next = look(self.plan, asked, self.directory, after, &mut self.damaged);
+            let Search::Next(run, number) = next else {
+                return Ok(true);
+            };
+            let directory = run.directory(self.directory);
+            if self.damaged.contains(&directory) {
+                return Ok(true);
+            }
+            if begun != number {
+                shown.begins(&run, number, &asked.name);
+                begun = number;
+            }
+            match self.work_on(&run, |_| {})? {
+                Some(Worked::Completed) => after = number - 1,
+                // Another process searches, too, and its run decides whether more are needed.
+                Some(Worked::Held(_)) if self.stop.load(Ordering::Relaxed) => return Ok(false),
+                Some(Worked::Held(holder)) => waiting.wait_for(&run, || {
+                    shown.waits(&run, &directory, holder.as_ref());
+                }),
+                Some(Worked::Interrupted) => return Ok(false),
+                // It is damaged, so nobody knows whether more are needed.
+                None => return Ok(true),
+            }
         }
-        if begun != number {
-            shown.begins(&run, number, &asked.name);
-            begun = number;
-        }
-        match work_on(&run, directory, stop, |_| {})? {
-            Worked::Completed => after = number - 1,
-            // Another process searches, too, and its run decides whether more are needed.
-            Worked::Held(_) if stop.load(Ordering::Relaxed) => break false,
-            Worked::Held(holder) => waiting.wait_for(&run, || {
-                shown.waits(&run, &run.directory(directory), holder.as_ref());
-            }),
-            Worked::Interrupted => break false,
-        }
-    };
-    shown.end();
-    Ok(ended)
+    }
 }
 
 /// The lines of `hashes.txt`, one a run that is done: its name and its hash. The SHA-256 of all
@@ -821,17 +921,15 @@ fn each_hash(
     directory: &Path,
     damaged: &mut DamagedRuns,
     mut take: impl FnMut(&str),
-) -> Result<(), RunDirError> {
+) {
     for run in runs.iter() {
-        if damaged.read(&run.directory(directory)).is_none() {
-            continue;
-        }
-        // Opened, not only read: what a process left that was killed at the very end goes.
-        if let Found::Finished(hash) = RunDir::open(&run.directory(directory))? {
-            take(&format!("{} {hash}\n", run.id));
+        let directory = run.directory(directory);
+        if let Some(finished) = damaged.read(&directory) {
+            // What a process left that was killed at the very end; the directory need not be ours.
+            let _ = tidy(&directory);
+            take(&format!("{} {}\n", run.id, finished.hash));
         }
     }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -59,10 +59,10 @@ impl<'a> SuiteProgress<'a> {
         self.settle(run, generation);
         match &self.shown {
             Shown::Bar(bar) => bar.set_message(format!(
-                "{}  generation {generation}/{}  {} left",
+                "{}  generation {generation}/{}{}",
                 for_stderr(&self.label(run)),
                 run.settings.generations,
-                seconds(self.left())
+                self.left_in_words()
             )),
             Shown::Json => show_event!(
                 "{}",
@@ -86,10 +86,10 @@ impl<'a> SuiteProgress<'a> {
         match &self.shown {
             Shown::Bar(bar) => bar.set_position(done),
             Shown::Lines => tell!(
-                "{done}/{} runs  {}  {} left",
+                "{done}/{} runs  {}{}",
                 self.runs,
                 self.label(run),
-                seconds(self.left())
+                self.left_in_words()
             ),
             Shown::Json => show_event!(
                 "{}",
@@ -99,7 +99,7 @@ impl<'a> SuiteProgress<'a> {
                     "label": self.label(run),
                     "runs_done": done,
                     "runs": self.runs,
-                    "seconds_left": self.left().as_secs_f64(),
+                    "seconds_left": self.left().map(|left| left.as_secs_f64()),
                 })
             ),
             Shown::Nothing => {}
@@ -122,13 +122,21 @@ impl<'a> SuiteProgress<'a> {
         self.plan.title(run)
     }
 
-    fn left(&self) -> Duration {
-        self.started.elapsed().mul_f64(self.share_left())
+    fn left_in_words(&self) -> String {
+        let words = |left| format!("  {} left", seconds(left));
+        self.left().map_or_else(String::new, words)
+    }
+
+    /// None while this process has worked nothing, or if it is longer than can be said.
+    fn left(&self) -> Option<Duration> {
+        let left = self.started.elapsed().as_secs_f64() * self.share_left()?;
+        Duration::try_from_secs_f64(left).ok()
     }
 
     /// What is left, by what this process has worked.
-    fn share_left(&self) -> f64 {
-        self.left.get() as f64 / self.worked.get().max(1) as f64
+    fn share_left(&self) -> Option<f64> {
+        let worked = self.worked.get();
+        (worked > 0).then(|| self.left.get() as f64 / worked as f64)
     }
 
     /// Takes the generations of a run from what is left, also those that others have done.
@@ -258,20 +266,21 @@ mod tests {
         let (small, large) = (&runs[0], &runs[1]);
         let all = runs.iter().map(robot_steps).sum();
         let shown = SuiteProgress::start(ProgressMode::None, &plan, 2, 2, all);
+        assert_eq!(shown.left(), None, "nothing is known yet");
         for generation in 1..=4 {
             shown.generation(small, generation);
         }
         shown.completed(small);
         assert_eq!(
             shown.share_left(),
-            4.0,
+            Some(4.0),
             "the large one costs four times as much"
         );
         // Two of its generations were done before, by another process.
         shown.generation(large, 3);
-        assert_eq!(shown.share_left(), 0.5);
+        assert_eq!(shown.share_left(), Some(0.5));
         shown.generation(large, 4);
         shown.completed(large);
-        assert_eq!(shown.share_left(), 0.0);
+        assert_eq!(shown.share_left(), Some(0.0));
     }
 }

@@ -89,6 +89,15 @@ pub struct Runs<'a> {
     step: u64,
 }
 
+/// Some runs of a plan that differ in nothing but their seeds.
+#[derive(Clone, Debug)]
+pub struct RunsAlike {
+    settings: PlannedSettings,
+    first: u64,
+    step: u64,
+    number: u64,
+}
+
 impl PlannedExperiment {
     /// Every combination of its settings.
     pub fn settings(&self) -> impl Iterator<Item = PlannedSettings> {
@@ -157,20 +166,45 @@ impl<'a> Runs<'a> {
 
     /// The runs, in order.
     pub fn iter(self) -> impl Iterator<Item = PlannedRun> + 'a {
+        self.by_settings().flat_map(|alike| alike.runs())
+    }
+
+    /// The runs, in order, by their settings.
+    pub fn by_settings(self) -> impl Iterator<Item = RunsAlike> + 'a {
         let Self { plan, first, step } = self;
         let mut skipped = first;
-        plan.different.iter().flat_map(move |range| {
+        plan.different.iter().filter_map(move |range| {
             let runs = u64::from(range.runs);
             let start = skipped.min(runs);
-            let taken = (runs - start).div_ceil(step);
-            skipped = skipped + taken * step - runs;
+            let number = (runs - start).div_ceil(step);
+            skipped = skipped + number * step - runs;
             let experiment = &plan.experiments[range.experiment as usize];
-            let settings = (taken > 0).then(|| experiment.combination(range.combination.into()));
-            let first = u64::from(range.first) + start;
-            settings.into_iter().flat_map(move |settings| {
-                (0..taken).filter_map(move |n| settings.run(first + n * step))
+            (number > 0).then(|| RunsAlike {
+                settings: experiment.combination(range.combination.into()),
+                first: u64::from(range.first) + start,
+                step,
+                number,
             })
         })
+    }
+}
+
+impl RunsAlike {
+    /// What they share, with the first seed of the experiment.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings.settings
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// The runs, in order.
+    pub fn runs(self) -> impl Iterator<Item = PlannedRun> {
+        (0..self.number).filter_map(move |n| self.settings.run(self.first + n * self.step))
     }
 }
 
@@ -271,15 +305,6 @@ impl Plan {
             first: index.into(),
             step: u64::from(of).max(1),
         }
-    }
-
-    /// The different runs by their settings, with their number.
-    pub fn by_settings(&self) -> impl Iterator<Item = (Settings, u32)> {
-        self.different.iter().map(|range| {
-            let experiment = &self.experiments[range.experiment as usize];
-            let planned = experiment.combination(range.combination.into());
-            (planned.settings, range.runs)
-        })
     }
 
     /// A run for people: its place in its experiment, its settings and seed.
@@ -479,7 +504,7 @@ mod tests {
             .collect();
         assert_eq!(found, expected);
         assert_eq!(plan.runs().number(), expected.len() as u64);
-        let by_settings = plan.by_settings().map(|(_, runs)| u64::from(runs));
+        let by_settings = plan.runs().by_settings().map(|alike| alike.number());
         assert_eq!(by_settings.sum::<u64>(), expected.len() as u64);
         assert!(expected.len() < 3 * 2 + 9 * 6 + 4 * 4, "some are shared");
     }

@@ -6,9 +6,10 @@
 //! done by its files.
 
 use crate::files::{self, FileError};
+use crate::new_dir::{NewDir, remove_abandoned};
 use crate::text::{shell_path, shell_word};
 use std::fs;
-use std::io::{self, ErrorKind};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -76,10 +77,15 @@ impl Job<'_> {
     /// [`SubmitError::UnusablePath`].
     pub fn script(&self) -> Result<String, SubmitError> {
         self.check_path()?;
+        Ok(self.script_in(&self.next_folder()))
+    }
+
+    /// The folder of the next submission.
+    fn next_folder(&self) -> PathBuf {
         let jobs = self.directory.join(JOBS);
-        let next = (1_u32..).map(|number| jobs.join(number.to_string()));
-        let free = next.into_iter().find(|folder| !folder.exists());
-        Ok(self.script_in(&free.expect("there are more numbers than folders")))
+        let mut next = (1_u32..).map(|number| jobs.join(number.to_string()));
+        let free = next.find(|folder| folder.symlink_metadata().is_err());
+        free.expect("there are more numbers than folders")
     }
 
     fn check_path(&self) -> Result<(), SubmitError> {
@@ -123,8 +129,16 @@ impl Job<'_> {
     /// left then.
     pub fn submit(&self, suite_text: &str) -> Result<String, SubmitError> {
         self.check_path()?;
-        let folder = self.new_folder()?;
-        let submitted = self.submit_from(&folder, suite_text);
+        remove_abandoned(&self.directory.join(JOBS));
+        let folder = loop {
+            let folder = self.next_folder();
+            match self.write(&folder, suite_text) {
+                // Another submission has taken the number meanwhile.
+                Err(error) if error.is_exists() => {}
+                written => break written.map(|()| folder)?,
+            }
+        };
+        let submitted = self.submit_from(&folder);
         if submitted.is_err() {
             // No task will ever look into it; that it cannot be removed changes nothing.
             let _ = fs::remove_dir_all(&folder);
@@ -132,28 +146,22 @@ impl Job<'_> {
         submitted
     }
 
-    /// A new folder with the next number.
-    fn new_folder(&self) -> Result<PathBuf, FileError> {
-        let jobs = self.directory.join(JOBS);
-        fs::create_dir_all(&jobs).map_err(FileError::at(&jobs))?;
-        let mut number = 1_u32;
-        loop {
-            let folder = jobs.join(number.to_string());
-            match fs::create_dir(&folder) {
-                Ok(()) => return Ok(folder),
-                Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
-                Err(error) => return Err(FileError::at(&folder)(error)),
-            }
-        }
+    /// Writes what the tasks need into a new folder.
+    fn write(&self, folder: &Path, suite_text: &str) -> Result<(), FileError> {
+        let new = NewDir::beside(folder)?;
+        let program = new.path().join(PROGRAM);
+        let script = self.script_in(folder);
+        files::replace(&new.path().join(SUITE_FILE), suite_text.as_bytes())
+            .and_then(|()| files::replace(&new.path().join(SCRIPT), script.as_bytes()))
+            .and_then(|()| {
+                let copied = std::env::current_exe().and_then(|this| fs::copy(this, &program));
+                copied.map(drop).map_err(FileError::at(&program))
+            })
+            .map_err(|error| new.in_place(error))?;
+        new.publish()
     }
 
-    fn submit_from(&self, folder: &Path, suite_text: &str) -> Result<String, SubmitError> {
-        files::replace(&folder.join(SUITE_FILE), suite_text.as_bytes())?;
-        let program = folder.join(PROGRAM);
-        std::env::current_exe()
-            .and_then(|this| fs::copy(this, &program))
-            .map_err(FileError::at(&program))?;
-        files::replace(&folder.join(SCRIPT), self.script_in(folder).as_bytes())?;
+    fn submit_from(&self, folder: &Path) -> Result<String, SubmitError> {
         let output = Command::new("sbatch")
             .arg(SCRIPT)
             .current_dir(folder)

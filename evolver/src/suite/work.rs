@@ -185,9 +185,9 @@ fn begin_or_go_on(
 
 /// The run as it stands, held by this process; none if it is complete.
 fn open(run: &PlannedRun, directory: &Path) -> Result<Option<(Experiment, RunDir)>, RunDirError> {
-    let experiment = Experiment::new(run.settings.clone());
     match found(directory) {
         Err(RunDirError::NotARun { .. } | RunDirError::NotThere(_)) => {
+            let experiment = Experiment::new(run.settings.clone());
             match RunDir::create(directory, &experiment) {
                 Ok(held) => Ok(Some((experiment, held.with_table_last()))),
                 // Another process has just made it.
@@ -200,10 +200,12 @@ fn open(run: &PlannedRun, directory: &Path) -> Result<Option<(Experiment, RunDir
 }
 
 fn found(directory: &Path) -> Result<Option<(Experiment, RunDir)>, RunDirError> {
-    Ok(match RunDir::open(directory)? {
-        Found::Finished(_) => None,
-        Found::Unfinished(experiment, held) => Some((*experiment, held.with_table_last())),
-    })
+    Ok(
+        match RunDir::open(directory, rayon::current_num_threads() as f64)? {
+            Found::Finished(_) => None,
+            Found::Unfinished(experiment, held) => Some((*experiment, held.with_table_last())),
+        },
+    )
 }
 
 #[cfg(test)]

@@ -10,7 +10,8 @@ use super::recording::Recording;
 use super::scene::{Colouring, Ink, Scene};
 use crate::damaged_runs::DamagedRuns;
 use crate::files::{self, Existing, FileError};
-use crate::finished_run::{FinishedRun, Progress, ReadRunError};
+use crate::finished_run::{FinishedRun, Progress, ReadRunError, settings_of_run};
+use crate::limits::{Needs, TooMuch};
 use crate::new_dir::{NewDir, remove_abandoned};
 use crate::run_files::{CONFIG, DONE};
 use crate::settings::model_name;
@@ -61,6 +62,9 @@ pub enum GalleryError {
     /// There is something already.
     #[error("{} exists; name another folder, or replace its pages with --overwrite", .0.display())]
     Exists(PathBuf),
+    /// It takes more than this machine has.
+    #[error(transparent)]
+    TooMuch(#[from] TooMuch),
     /// A file or folder cannot be used.
     #[error(transparent)]
     File(#[from] FileError),
@@ -79,10 +83,13 @@ pub struct Written {
     pub damaged: DamagedRuns,
     /// Size of all its pages.
     pub bytes: u64,
+    /// Whether another process wrote it, after this one had begun.
+    pub by_another: bool,
 }
 
 /// Writes the gallery of all runs in some directories: run directories, or directories that hold
-/// run directories. A new gallery is there as a whole or not at all; in a folder that exists, pages
+/// run directories. A new gallery is there as a whole or not at all, and if another process writes
+/// one meanwhile, that one stays: the same runs give the same pages. In a folder that exists, pages
 /// are replaced one by one, and other files stay.
 ///
 /// # Errors
@@ -104,27 +111,31 @@ pub fn write(
             GalleryError::Damaged(found.damaged)
         });
     }
-    let into_existing = || found.write(out, out);
-    if exists() {
+    found.check_memory()?;
+    let into_existing = || {
+        files::remove_old_parts(out);
+        found.write(out, out)
+    };
+    if exists() && existing == Existing::Replace {
         return into_existing();
     }
     remove_abandoned(files::parent(out));
-    let write = || {
-        let new = NewDir::beside(out)?;
-        let written = found.write(new.path(), out).map_err(|error| match error {
-            GalleryError::File(error) => new.in_place(error).into(),
-            error => error,
-        })?;
-        new.publish()?;
-        Ok(written)
-    };
-    match write() {
-        // Another process has made it meanwhile.
-        Err(GalleryError::File(error)) if error.is_exists() => match existing {
-            Existing::Refuse => Err(GalleryError::Exists(out.to_owned())),
+    let new = NewDir::unchecked_beside(out)?;
+    let written = found.write(new.path(), out).map_err(|error| match error {
+        GalleryError::File(error) => new.in_place(error).into(),
+        error => error,
+    })?;
+    match new.publish() {
+        // Another process has made something of this name meanwhile.
+        Err(error) if error.is_exists() => match existing {
             Existing::Replace => into_existing(),
+            Existing::Refuse if is_marked(out)? => Ok(Written {
+                by_another: true,
+                ..written
+            }),
+            Existing::Refuse => Err(GalleryError::Exists(out.to_owned())),
         },
-        written => written,
+        published => Ok(published.map(|()| written)?),
     }
 }
 
@@ -194,6 +205,19 @@ impl Found {
         Ok(())
     }
 
+    /// Whether the memory is there for the largest recordings, one a thread; what cannot be read is
+    /// said later.
+    fn check_memory(&self) -> Result<(), TooMuch> {
+        let at_once = self.runs.len().min(rayon::current_num_threads()) as f64;
+        let settings = self
+            .runs
+            .iter()
+            .filter_map(|(run, _)| settings_of_run(run).ok());
+        let recordings = settings.map(|settings| Needs::of_recording(&settings.scenario));
+        let largest = recordings.max_by(|one, other| one.memory().total_cmp(&other.memory()));
+        largest.map_or(Ok(()), |needs| needs.times(at_once).check_memory())
+    }
+
     /// Writes all pages, the first one last; `out` is where they will be.
     fn write(&self, folder: &Path, out: &Path) -> Result<Written, GalleryError> {
         let cards = self.runs.par_iter().map(|(run, name)| {
@@ -230,6 +254,7 @@ impl Found {
             unfinished: self.unfinished,
             damaged,
             bytes: (pages + index.len()) as u64,
+            by_another: false,
         })
     }
 }

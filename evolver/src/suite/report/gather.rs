@@ -6,7 +6,7 @@ use crate::damaged_runs::DamagedRuns;
 use crate::finished_run::FinishedRun;
 use crate::reevaluation::{ResilienceRow, after_damage, mean, rerun, resilience};
 use crate::settings::Settings;
-use crate::suite::plan::{Plan, PlannedExperiment, PlannedRun, PlannedSettings, label};
+use crate::suite::plan::{Plan, PlannedExperiment, PlannedRun, PlannedSettings, RUNS, label};
 use crate::suite::search::{Search, look};
 use crate::suite::{Reevaluation, Resilience, Suite};
 use crate::text::hex;
@@ -15,7 +15,7 @@ use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::structures::{LineCounts, LineOrientation, Structure, classify};
 use minimal_surprise_sim::{Area, Damage, Pose, SeedTree};
 use sha2::{Digest, Sha256};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A finished run and what is known of it.
 #[derive(Clone, Debug)]
@@ -340,6 +340,13 @@ impl Gathered {
         self.further.iter().find(|further| {
             (&further.experiment, &further.label) == (&group.experiment, &group.label)
         })
+    }
+
+    /// The directories of the planned runs that are done, in that of the suite.
+    #[must_use]
+    pub fn directories(&self, suite: &Path) -> Vec<PathBuf> {
+        let runs = self.groups.iter().flat_map(|group| &group.runs);
+        runs.map(|run| suite.join(RUNS).join(&run.id)).collect()
     }
 
     /// Names of the experiments, in order.

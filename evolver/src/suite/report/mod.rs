@@ -16,8 +16,6 @@ pub mod statistics;
 pub mod tables;
 
 use super::Suite;
-use super::plan::Plan;
-use crate::damaged_runs::DamagedRuns;
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::replay::gallery;
 use crate::report::progress::seconds;
@@ -78,8 +76,6 @@ pub struct Written {
     pub finished: usize,
     /// Runs that are planned.
     pub planned: usize,
-    /// Runs that are left out.
-    pub damaged: DamagedRuns,
 }
 
 /// How the runs of a setting were made, the evolved ones or those that were run again.
@@ -204,22 +200,20 @@ pub fn may_be_written(out: &Path) -> Result<bool, FileError> {
     Ok(true)
 }
 
-/// Writes the report of a plan's finished runs, with the data of its tables and figures as CSV.
-/// `directory` is that of the suite, `out` that of the report, which is made; `called` is how the
-/// program was called with this suite, for the commands in it. If `out` has a
+/// Writes the report of gathered runs, with the data of its tables and figures as CSV. `out` is the
+/// directory of the report, which is made; `called` is how the program was called with this suite,
+/// for the commands in it. If `out` has a
 /// `looked-into.md`, its text comes after the differences: paragraphs, and list items with a dash.
 ///
 /// # Errors
 /// [`ReportError`] if a file cannot be written.
 pub fn write(
-    plan: &Plan,
+    gathered: &Gathered,
     suite: &Suite,
-    directory: &Path,
     out: &Path,
     called: &str,
 ) -> Result<Written, ReportError> {
-    let gathered = Gathered::read(plan, suite, directory)?;
-    let mut report = Report::of(&gathered, suite, called)?;
+    let mut report = Report::of(gathered, suite, called)?;
     report.has_gallery = files::exists(&out.join(GALLERY).join(gallery::INDEX))?;
     let looked_into = out.join(LOOKED_INTO);
     if files::exists(&looked_into)? {
@@ -229,7 +223,7 @@ pub fn write(
     let mut files = vec![
         ("report.html".to_owned(), html::page(&report)),
         ("report.md".to_owned(), markdown::text(&report)),
-        ("runs.csv".to_owned(), csv_text(&run_rows(&gathered))),
+        ("runs.csv".to_owned(), csv_text(&run_rows(gathered))),
         ("findings.csv".to_owned(), csv_text(&report.findings)),
         ("how-made.csv".to_owned(), csv_text(&report.making)),
     ];
@@ -242,6 +236,7 @@ pub fn write(
         files.push((format!("{}.csv", figure.id), figure.csv.clone()));
     }
     std::fs::create_dir_all(out).map_err(FileError::at(out))?;
+    files::remove_old_parts(out);
     files::replace(
         &out.join(MARKER),
         b"A report of evolver; another may replace it.\n",
@@ -258,7 +253,6 @@ pub fn write(
         files: written,
         finished: gathered.groups.iter().map(|group| group.runs.len()).sum(),
         planned: gathered.groups.iter().map(|group| group.planned).sum(),
-        damaged: gathered.damaged,
     })
 }
 
@@ -563,6 +557,7 @@ mod tests {
     use super::*;
     use crate::finished_run::FinishedRun;
     use crate::reevaluation::median;
+    use crate::suite::plan::Plan;
     use crate::suite::work::{Worked, work_on};
     use std::collections::BTreeMap;
     use std::sync::atomic::AtomicBool;
@@ -589,6 +584,17 @@ mod tests {
         robots-in-areas = [3, 2]
         repeat = 4
     ";
+
+    fn report_of(
+        plan: &Plan,
+        suite: &Suite,
+        directory: &Path,
+        out: &Path,
+        called: &str,
+    ) -> Written {
+        let gathered = Gathered::read(plan, suite, directory).unwrap();
+        write(&gathered, suite, out, called).unwrap()
+    }
 
     #[test]
     fn tests_that_cannot_find_a_difference_or_are_repeated_do_not_count() {
@@ -652,7 +658,7 @@ mod tests {
             assert_eq!(worked.unwrap(), Worked::Completed);
         }
         let out = scratch.path().join("report");
-        let written = write(&plan, &suite, scratch.path(), &out, "evolver").unwrap();
+        let written = report_of(&plan, &suite, scratch.path(), &out, "evolver");
         assert_eq!((written.finished, written.planned), (1, 1));
         let runs = std::fs::read_to_string(out.join("runs.csv")).unwrap();
         let beyond: Vec<&str> = runs
@@ -688,7 +694,7 @@ mod tests {
             assert_eq!(worked.unwrap(), Worked::Completed);
         }
         let out = scratch.path().join("report");
-        write(&plan, &suite, scratch.path(), &out, "evolver").unwrap();
+        report_of(&plan, &suite, scratch.path(), &out, "evolver");
         let markdown = std::fs::read_to_string(out.join("report.md")).unwrap();
         let figures: Vec<usize> = [
             "one-9-temperature",
@@ -731,7 +737,7 @@ mod tests {
         assert!(!last.directory(&directory).exists());
 
         let called = "evolver suite suites/own.toml";
-        let written = write(&plan, &suite, &directory, &out, called).unwrap();
+        let written = report_of(&plan, &suite, &directory, &out, called);
         assert_eq!((written.finished, written.planned), (5, 6));
         assert!(written.files.iter().all(|file| file.is_file()));
         let markdown = std::fs::read_to_string(&written.markdown).unwrap();
@@ -768,7 +774,7 @@ mod tests {
         std::fs::create_dir_all(&gallery).unwrap();
         std::fs::write(gallery.join("index.html"), "a gallery").unwrap();
         let out_with = gallery.parent().unwrap();
-        let with = write(&plan, &suite, &directory, out_with, called).unwrap();
+        let with = report_of(&plan, &suite, &directory, out_with, called);
         for report in [&with.html, &with.markdown] {
             let report = std::fs::read_to_string(report).unwrap();
             assert!(report.contains("gallery/index.html") && !report.contains(makes_one));
@@ -806,7 +812,7 @@ mod tests {
         }
 
         let again = scratch.path().join("again");
-        let again = write(&plan, &suite, &directory, &again, called).unwrap();
+        let again = report_of(&plan, &suite, &directory, &again, called);
         for (first, second) in written.files.iter().zip(&again.files) {
             assert_eq!(
                 std::fs::read(first).unwrap(),
