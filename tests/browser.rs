@@ -1,9 +1,9 @@
 //! The pages, opened from files in a headless Chromium that has no network.
 
-use minimal_surprise_evolver::finished_run::FinishedRun;
-use minimal_surprise_evolver::replay::page::page;
-use minimal_surprise_evolver::replay::recording::Recording;
-use minimal_surprise_evolver::replay::scene::{Colouring, Scene};
+use minimal_surprise_evolution::finished_run::FinishedRun;
+use minimal_surprise_replay::page::page;
+use minimal_surprise_replay::recording::Recording;
+use minimal_surprise_replay::scene::{Colouring, Scene};
 use minimal_surprise_sim::damage::{Area, Damage};
 use minimal_surprise_sim::exchange::Trajectory;
 use serde_json::{Value, json};
@@ -62,7 +62,7 @@ fn open(browser: &mut Browser, page: &Path) {
 
 fn recording_of(evolver: &Evolver, run: &str) -> Recording {
     let path = evolver.folder().join(run);
-    Recording::of_run(run, &FinishedRun::read(&path).unwrap()).unwrap()
+    Recording::of_run(run, &FinishedRun::read(&path).unwrap(), &|| ()).unwrap()
 }
 
 /// Compares every kind of scene of some states with the page's.
@@ -134,7 +134,7 @@ fn damaged_swarms_genomes_and_trajectories_say_what_their_steps_can_be_compared_
     let Some(mut browser) = browser() else { return };
     let evolver = with_runs(&[("run", "--seed 4 --steps 150")]);
     let finished = FinishedRun::read(&evolver.folder().join("runs/run")).unwrap();
-    let area = Area::new(finished.settings.scenario.grid(), 13, 2, 3, 9).unwrap();
+    let area = Area::new(finished.settings.scenario().grid(), 13, 2, 3, 9).unwrap();
     for (flag, damage) in [
         ("remove", Damage::Remove(area)),
         ("reposition", Damage::Reposition(area)),
@@ -144,7 +144,7 @@ fn damaged_swarms_genomes_and_trajectories_say_what_their_steps_can_be_compared_
             &format!("replay runs/run --{flag} 13,2,3,9 --html {flag}.html"),
         );
         open(&mut browser, &evolver.folder().join(format!("{flag}.html")));
-        let recording = Recording::of_damage("run", &finished, damage).unwrap();
+        let recording = Recording::of_damage("run", &finished, damage, &|| ()).unwrap();
         assert_same_scenes(&mut browser, &recording);
         let (status, words) = checked(&mut browser);
         assert_eq!(status, "good");

@@ -4,11 +4,12 @@
 
 use embedded_storage::nor_flash::NorFlash;
 use minimal_surprise_controller::Topology;
-use minimal_surprise_evolver::experiment::Experiment;
-use minimal_surprise_evolver::limits::{self, Needs};
+use minimal_surprise_evolution::experiment::Experiment;
+use minimal_surprise_evolution::limits::{self, Needs};
+use minimal_surprise_evolution::run_dir::RunDir;
+use minimal_surprise_evolution::run_files::Program;
+use minimal_surprise_evolution::settings::{DRAWN_SEED_MAX, Overrides, Settings};
 use minimal_surprise_evolver::report::embedding::slot;
-use minimal_surprise_evolver::run_dir::RunDir;
-use minimal_surprise_evolver::settings::{DRAWN_SEED_MAX, Given, Settings};
 use minimal_surprise_evolver::suite::Suite;
 use minimal_surprise_evolver::suite::plan::Plan;
 use minimal_surprise_link::{Handler, Refusal};
@@ -52,7 +53,7 @@ fn evolve(settings: &[(&'static str, &str)]) -> Vec<String> {
 }
 
 fn settings(of: &[(&'static str, &str)]) -> Settings {
-    let mut given = Given::default();
+    let mut given = Overrides::default();
     for (key, value) in TINY.iter().chain(of) {
         given.flag(key, Some(value));
     }
@@ -131,7 +132,7 @@ fn the_memory_of_a_replay_and_of_new_starts_is_near_its_estimate() {
     let genome = "run/best.genome --grid 15x15 --robots 100";
     let scenario = |steps| {
         let of = [("grid", "15x15"), ("robots", "100"), ("steps", steps)];
-        settings(&of).scenario
+        *settings(&of).scenario()
     };
     let replay = words(&format!("replay {genome} --steps 30000 --svg still.svg"));
     let needs = Needs::of_recording(&scenario("30000"));
@@ -158,7 +159,7 @@ fn memory_that_is_used_for_one_condition_after_the_other_is_counted_once() {
         "evaluate run --grid 4000x4000 --robots 10 --noise 0,0.1,0.2,0.3,0.4 --steps 1 --starts 2 \
          --threads {THREADS}"
     ));
-    let scenario = settings(&[("grid", "4000x4000"), ("robots", "10")]).scenario;
+    let scenario = *settings(&[("grid", "4000x4000"), ("robots", "10")]).scenario();
     let needs = Needs::of_starts(&[(scenario, ()); 5], ("starts", 2), f64::from(THREADS));
     let measured = peak(&evolver, &evaluate);
     assert_near("five conditions", needs.memory() + PROGRAM, measured);
@@ -226,7 +227,14 @@ fn a_run_is_resumed_if_there_is_memory_for_the_threads_that_are_asked_for() {
         ("population", "512"),
     ]);
     let run = evolver.folder().join("run");
-    drop(RunDir::create(&run, &Experiment::new(settings.clone())).unwrap());
+    drop(
+        RunDir::create(
+            &run,
+            &Experiment::new(settings.clone()),
+            &Program::default(),
+        )
+        .unwrap(),
+    );
     let needs = |threads| Needs::of_evolution(&settings, threads).memory();
     let kilobytes = ((needs(1.0) + needs(512.0)) / 2.0 / 1000.0) as u32;
     let resume = |threads| words(&format!("evolve --resume run --threads {threads}"));
@@ -246,7 +254,7 @@ fn the_text_of_a_trajectory_is_nearly_as_long_as_estimated() {
     let exported = evolver.run(&words("export run --format trajectory --out text"));
     assert_eq!(exported.code, Some(0), "{exported:?}");
     let measured = evolver.read("text").len() as f64;
-    let estimated = Needs::of_trajectory(&settings(&of).scenario).disk();
+    let estimated = Needs::of_trajectory(settings(&of).scenario()).disk();
     assert_near("trajectory", estimated, measured);
 }
 
@@ -308,7 +316,7 @@ fn the_files_of_a_run_have_nearly_the_estimated_sizes() {
         let settings = settings(&of);
         let estimated = limits::checkpoint_bytes(&settings);
         let path = scratch.path().join(of[0].1);
-        let run = RunDir::create(&path, &Experiment::new(settings)).unwrap();
+        let run = RunDir::create(&path, &Experiment::new(settings), &Program::default()).unwrap();
         let measured = fs::metadata(run.path().join("checkpoint")).unwrap().len();
         assert_near("checkpoint", estimated, measured as f64);
     }

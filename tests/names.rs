@@ -1,6 +1,6 @@
 //! Names, paths and files of users, through the whole program.
 
-use minimal_surprise_evolver::text;
+use minimal_surprise_evolution::text;
 use pulldown_cmark::{Event, Options, Parser, Tag};
 use std::ffi::{OsStr, OsString};
 use std::fs;

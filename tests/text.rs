@@ -1,6 +1,6 @@
 //! Text from users: each form that it is turned into is read back by the program that reads it.
 
-use minimal_surprise_evolver::text::{
+use minimal_surprise_evolution::text::{
     self, FILE_NAME_BYTES_MAX, TextError, decode, file_name, file_name_except, html, is_hidden,
     markdown, markdown_code_cell, path_of_text, shell_path, shell_word, text_of_path,
 };

@@ -4,8 +4,8 @@
 
 use minimal_surprise_controller::Provenance;
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
-use minimal_surprise_evolver::experiment::Experiment;
-use minimal_surprise_evolver::settings::{Given, Settings};
+use minimal_surprise_evolution::experiment::Experiment;
+use minimal_surprise_evolution::settings::{Overrides, Settings};
 use minimal_surprise_sim::{Engine, Path};
 
 const GENERATIONS: [usize; 3] = [10, 50, 90];
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("c-20x20", "20x20", "0"),
         ("c-15x15-noise", "15x15", "0.1"),
     ] {
-        let mut given = Given::default();
+        let mut given = Overrides::default();
         for (key, value) in [("grid", grid), ("noise", noise), ("seed", "1")] {
             given.flag(key, Some(value));
         }

@@ -5,8 +5,8 @@
 //! prediction in 16 bits, and its pose afterwards; and at the end robot 0's mispredicted and seen
 //! bits in 64 bits each. A pose is x and y in 16 bits each and the heading in 8. All little-endian.
 
-use crate::text::hex;
 use minimal_surprise_controller::{Controller, Decision, SensorBits, State, Surprise};
+use minimal_surprise_evolution::text::hex;
 use minimal_surprise_link::Stepped;
 use minimal_surprise_sim::{Pose, Scenario, Trial, World, WorldError};
 use sha2::{Digest, Sha256};

@@ -8,7 +8,7 @@
 
 use crate::exit::Exit;
 use crate::signals;
-use crate::text::terminal_lines;
+use minimal_surprise_evolution::text::{ascii, terminal_lines};
 use std::borrow::Cow;
 use std::env;
 use std::fmt::Arguments;
@@ -64,52 +64,6 @@ fn locale_is_utf8() -> bool {
     let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set);
     let locale = locale.unwrap_or_default().to_string_lossy().to_lowercase();
     cfg!(windows) || locale.contains("utf-8") || locale.contains("utf8")
-}
-
-/// The text as a terminal without UTF-8 can show it.
-pub(crate) fn ascii(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len());
-    for letter in text.chars() {
-        let like = match letter {
-            letter if letter.is_ascii() => {
-                shown.push(letter);
-                continue;
-            }
-            '▶' | '▷' | '▸' => ">",
-            '▲' | '△' | '▴' => "^",
-            '◀' | '◁' | '◂' => "<",
-            '▼' | '▽' | '▾' => "v",
-            '·' => ".",
-            '–' | '—' | '−' | '─' => "-",
-            '━' => "=",
-            '…' => "...",
-            '×' => "x",
-            '✘' => "X",
-            '■' | '█' => "#",
-            '□' => "+",
-            '●' => "@",
-            '○' => "o",
-            '░' => ":",
-            '←' => "<",
-            '→' => ">",
-            '↑' => "^",
-            '↓' => "v",
-            '▁' => "_",
-            '▂' => ".",
-            '▃' => "-",
-            '▄' => "=",
-            '▅' => "+",
-            '▆' => "*",
-            '▇' => "%",
-            '⁰'..='⁹' | '²' | '³' | '¹' => "^",
-            _ => {
-                shown.extend(letter.escape_unicode());
-                continue;
-            }
-        };
-        shown.push_str(like);
-    }
-    shown
 }
 
 /// The text as standard error shows it.

@@ -32,6 +32,8 @@ pub enum Purpose {
     Damage = 8,
     /// Sensor noise after damage; generation: 0, index: repetition of the damage.
     DamageNoise = 9,
+    /// Crossover of a genome: whether, with whom, and which weights; index: slot of the genome.
+    Crossover = 10,
 }
 
 /// The root of all streams of a run.

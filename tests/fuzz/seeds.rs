@@ -3,9 +3,9 @@
 use super::targets::{CHECKPOINT_SETTINGS, SESSION, tests_folder};
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX, Provenance};
 use minimal_surprise_controller::{Genome, SensorBits, Topology};
-use minimal_surprise_evolver::checkpoint;
-use minimal_surprise_evolver::experiment::Experiment;
-use minimal_surprise_evolver::settings::{Given, Settings};
+use minimal_surprise_evolution::checkpoint;
+use minimal_surprise_evolution::experiment::Experiment;
+use minimal_surprise_evolution::settings::{Overrides, Settings};
 use minimal_surprise_evolver::suite::PAPER;
 use minimal_surprise_link::{
     Decoder, Direction, Envelope, PROTOCOL_VERSION, Refusal, Reply, Request, Server,
@@ -128,7 +128,7 @@ fn container(topology: Topology) -> Vec<u8> {
 fn experiment() -> Experiment {
     let file = tempfile::NamedTempFile::new().unwrap();
     fs::write(file.path(), CHECKPOINT_SETTINGS).unwrap();
-    let mut given = Given::default();
+    let mut given = Overrides::default();
     given.file(file.path()).unwrap();
     Experiment::new(Settings::resolve(&given, || 0).unwrap())
 }

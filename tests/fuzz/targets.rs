@@ -8,12 +8,12 @@ use firmware_example::range_bearing::RangeBearing;
 use minimal_surprise_controller::codec::{self, CRC_32C, CRC_BYTES, PREFIX_BYTES};
 use minimal_surprise_controller::neighbours::{CellSize, Neighbours};
 use minimal_surprise_controller::{Controller, EncodedGenome, SensorBits, SensorModel, Topology};
-use minimal_surprise_evolver::checkpoint;
-use minimal_surprise_evolver::finished_run::FinishedRun;
-use minimal_surprise_evolver::lock::Holder;
-use minimal_surprise_evolver::settings::{Given, Settings};
+use minimal_surprise_evolution::checkpoint;
+use minimal_surprise_evolution::finished_run::FinishedRun;
+use minimal_surprise_evolution::lock::Holder;
+use minimal_surprise_evolution::settings::{Overrides, Settings};
+use minimal_surprise_evolution::text::{is_hidden, path_of_text, text_of_path};
 use minimal_surprise_evolver::suite::Suite;
-use minimal_surprise_evolver::text::{is_hidden, path_of_text, text_of_path};
 use minimal_surprise_link::{Client, FRAME_BYTES_MAX, Request, Server, decode_reply};
 use minimal_surprise_sim::drawing;
 use minimal_surprise_sim::exchange::{Trajectory, import_genome, read_agents, read_genomes};
@@ -200,9 +200,9 @@ fn as_file<T>(bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
 }
 
 fn read_settings(bytes: &[u8]) -> Option<Settings> {
-    let mut given = Given::default();
+    let mut given = Overrides::default();
     as_file(bytes, |path| given.file(path)).ok()?;
-    given.forget("from");
+    given.remove("from");
     Settings::resolve(&given, || 7).ok()
 }
 
@@ -210,7 +210,7 @@ fn settings(bytes: &[u8]) -> bool {
     let Some(settings) = read_settings(bytes) else {
         return false;
     };
-    let written = toml::to_string(&settings.written).unwrap();
+    let written = settings.toml();
     assert_eq!(read_settings(written.as_bytes()), Some(settings));
     true
 }

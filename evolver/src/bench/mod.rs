@@ -7,8 +7,8 @@
 pub mod f32_program;
 pub mod populations;
 
-use crate::usage::{self, Stopwatch};
 use minimal_surprise_controller::{Controller, Genome, SensorModel, Topology};
+use minimal_surprise_evolution::usage::{self, Stopwatch};
 use minimal_surprise_sim::{
     Engine, Evaluator, Grid, NoiseRate, Path, Scenario, SeedTree, Trial, TrialSet, World,
 };

@@ -2,10 +2,10 @@
 
 use super::BadInput;
 use super::errors::unusable;
-use crate::files::{self, DATA_BYTES_MAX};
-use crate::finished_run::{FinishedRun, parse_final_state};
 use crate::report::structures::{self, Classified};
-use crate::text::{self, TextError};
+use minimal_surprise_evolution::files::{self, DATA_BYTES_MAX};
+use minimal_surprise_evolution::finished_run::{FinishedRun, parse_final_state};
+use minimal_surprise_evolution::text::{self, TextError};
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::structures::classify as find_structures;
 use minimal_surprise_sim::{Grid, Pose, drawing};
@@ -19,7 +19,7 @@ pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
     let (grid, poses, measures) = if path.is_dir() {
         let finished = FinishedRun::read_and_check(path).map_err(unusable)?;
         let measures = finished.measures()?;
-        let grid = finished.settings.scenario.grid();
+        let grid = finished.settings.scenario().grid();
         (grid, finished.final_poses, Some(measures))
     } else {
         let (grid, poses) = read_state(path)?;

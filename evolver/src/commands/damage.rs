@@ -2,12 +2,12 @@
 
 use super::errors::unusable;
 use super::{BadInput, flag, thread_pool, threads_flag};
-use crate::finished_run::FinishedRun;
-use crate::limits::{self, Needs};
-use crate::reevaluation::resilience;
 use crate::report::reevaluation::{resilience_json, resilience_text};
-use crate::settings::count;
 use clap::Args;
+use minimal_surprise_evolution::finished_run::FinishedRun;
+use minimal_surprise_evolution::limits::{self, Needs};
+use minimal_surprise_evolution::reevaluation::resilience;
+use minimal_surprise_evolution::settings::count;
 use minimal_surprise_sim::damage::{Area, Damage};
 use minimal_surprise_sim::structures::{Structure, classify};
 use std::path::PathBuf;
@@ -55,7 +55,7 @@ pub struct DamageArgs {
 /// [`BadInput`] names the flag, the value and what would be valid.
 pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
     let finished = FinishedRun::read_and_check(&arguments.run).map_err(unusable)?;
-    let grid = finished.settings.scenario.grid();
+    let grid = finished.settings.scenario().grid();
     let [x0, y0, x1, y1] = flag("area", &arguments.area, corners)?;
     let about_area = |error: &dyn std::fmt::Display| {
         BadInput::new(format!("--area = {}: {error}", arguments.area))
@@ -80,9 +80,9 @@ pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
             })?
         }
     };
-    let scenario = finished.settings.scenario;
+    let scenario = finished.settings.scenario();
     Needs::of_starts(
-        &[(scenario, ())],
+        &[(*scenario, ())],
         ("repeat", repeat),
         limits::threads(threads),
     )

@@ -1,17 +1,17 @@
 //! Which errors are whose: what the user gave cannot be used, or something broke.
 
-use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
-use crate::files::FileError;
-use crate::finished_run::ReadRunError;
 use crate::output;
-use crate::replay::gallery::GalleryError;
-use crate::run_dir::RunDirError;
-use crate::run_files::DONE;
-use crate::settings::SettingError;
 use crate::suite::report::ReportError;
 use crate::suite::slurm::SubmitError;
-use crate::text::shell_path;
+use minimal_surprise_evolution::damaged_runs::DamagedRuns;
+use minimal_surprise_evolution::files::FileError;
+use minimal_surprise_evolution::finished_run::ReadRunError;
+use minimal_surprise_evolution::run_dir::RunDirError;
+use minimal_surprise_evolution::run_files::DONE;
+use minimal_surprise_evolution::settings::SettingError;
+use minimal_surprise_evolution::text::shell_path;
+use minimal_surprise_replay::gallery::GalleryError;
 
 /// Input that cannot be used, in one message.
 #[derive(Debug, thiserror::Error)]

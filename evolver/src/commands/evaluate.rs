@@ -2,16 +2,16 @@
 
 use super::errors::unusable;
 use super::{BadInput, flag, genome_file, read_genome, thread_pool, threads_flag};
-use crate::files;
-use crate::finished_run::settings_of_run;
-use crate::limits::{self, Needs};
-use crate::reevaluation::rerun;
 use crate::report::reevaluation::{Condition, conditions_json, conditions_text};
-use crate::run_files::CONFIG;
-use crate::settings::{Settings, count, parse_grid, probability};
-use crate::text::terminal_path;
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
+use minimal_surprise_evolution::files;
+use minimal_surprise_evolution::finished_run::settings_of_run;
+use minimal_surprise_evolution::limits::{self, Needs};
+use minimal_surprise_evolution::reevaluation::rerun;
+use minimal_surprise_evolution::run_files::CONFIG;
+use minimal_surprise_evolution::settings::{self, Settings, count, probability, setting};
+use minimal_surprise_evolution::text::terminal_path;
 use minimal_surprise_sim::{NoiseRate, Scenario, SeedTree};
 use std::path::{Path, PathBuf};
 
@@ -60,30 +60,28 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     let file = genome_file(&arguments.genome);
     let bytes = read_genome(&arguments.genome)?;
     let run = conditions_beside(&file)?;
-    let or_of_run = |given: &Option<String>, of_run: fn(&Settings) -> String, default: &str| {
-        let of_run = || run.as_ref().map(of_run);
-        given
-            .clone()
-            .or_else(of_run)
-            .unwrap_or_else(|| default.to_owned())
+    let value = |name: &str, given: &Option<String>| {
+        let of_run = || run.as_ref()?.value(name).map(|value| value.to_string());
+        let default = || {
+            setting(name)
+                .map_or("", |setting| setting.default)
+                .to_owned()
+        };
+        given.clone().or_else(of_run).unwrap_or_else(default)
     };
-    let grid = or_of_run(&arguments.grid, |run| run.written.grid.clone(), "15x15");
-    let noise = or_of_run(&arguments.noise, |run| run.written.noise.to_string(), "0");
-    let robots = or_of_run(
-        &arguments.robots,
-        |run| run.written.robots.to_string(),
-        "100",
-    );
-    let steps = or_of_run(&arguments.steps, |run| run.written.steps.to_string(), "500");
+    let grid = value("grid", &arguments.grid);
+    let noise = value("noise", &arguments.noise);
+    let robots = value("robots", &arguments.robots);
+    let steps = value("steps", &arguments.steps);
     let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
     let starts = flag("starts", &arguments.starts, |text| count(text, 1_000_000))?;
     let steps = flag("steps", &steps, |text| count(text, u32::MAX))?;
-    let grids = list("grid", &grid, parse_grid)?;
+    let grids = list("grid", &grid, settings::grid)?;
     let noises = list("noise", &noise, probability)?;
     let swarms = list("robots", &robots, |text| count(text, u32::MAX))?;
     let threads = threads_flag(&arguments.threads)?;
     let seed = match &arguments.seed {
-        Some(text) => flag("seed", text, crate::settings::seed)?,
+        Some(text) => flag("seed", text, settings::seed)?,
         None => encoded.provenance().seed.unwrap_or(0),
     };
     let mut scenarios = Vec::new();

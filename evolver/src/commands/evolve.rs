@@ -1,25 +1,28 @@
 //! `evolver evolve`: evolve a swarm, or go on with a run.
 
 use super::errors::{stopped, unusable};
-use super::replay::in_terminal;
+use super::replay::{check_terminal, in_terminal};
+use super::setting_flags::SettingFlags;
 use super::{BadInput, thread_pool};
-use crate::evolving::until_finished;
 use crate::exit::Exit;
-use crate::experiment::Experiment;
-use crate::files;
-use crate::finished_run::FinishedRun;
-use crate::limits::{self, Needs};
-use crate::new_dir::remove_abandoned;
-use crate::replay::recording::Recording;
-use crate::replay::scene::Colouring;
-use crate::replay::terminal;
-use crate::report::progress::{Progress, ProgressMode};
+use crate::program::this_program;
+use crate::report::progress::{Progress, ProgressMode, computing};
 use crate::report::summary;
-use crate::run_dir::{Found, RunDir};
-use crate::settings::{self, Given, SettingError, Settings};
 use crate::signals::stop_on_signal;
-use crate::text::{shell_path, terminal_path, text_of_path};
 use clap::{Args, ValueEnum};
+use minimal_surprise_evolution::evolving::until_finished;
+use minimal_surprise_evolution::experiment::Experiment;
+use minimal_surprise_evolution::files;
+use minimal_surprise_evolution::finished_run::FinishedRun;
+use minimal_surprise_evolution::limits::{self, Needs};
+use minimal_surprise_evolution::new_dir::remove_abandoned;
+use minimal_surprise_evolution::run_dir::{Found, RunDir};
+use minimal_surprise_evolution::settings::{
+    DRAWN_SEED_MAX, Overrides, SettingError, Settings, add_seed,
+};
+use minimal_surprise_evolution::text::{shell_path, terminal_path, text_of_path};
+use minimal_surprise_replay::recording::Recording;
+use minimal_surprise_replay::scene::Colouring;
 use minimal_surprise_sim::{Engine, Path as CodePath};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -27,58 +30,12 @@ use std::sync::atomic::AtomicBool;
 /// Settings as flags; a file has the same names. Defaults are the paper's.
 #[derive(Debug, Default, Args)]
 pub struct EvolveArgs {
-    /// TOML file with any of the settings below; flags go before it.
+    /// TOML file with any of the settings below; flags override it.
     config: Option<PathBuf>,
-    /// Width and height of the torus, in cells [default: 15x15].
-    #[arg(long, value_name = "WxH", allow_hyphen_values = true)]
-    grid: Option<String>,
-    /// Swarm size [default: 100].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    robots: Option<String>,
-    /// Sensor model: a, b or c [default: c].
-    #[arg(long, value_name = "MODEL", allow_hyphen_values = true)]
-    sensor_model: Option<String>,
-    /// Probability that a sensor bit is flipped [default: 0].
-    #[arg(long, value_name = "P", allow_hyphen_values = true)]
-    noise: Option<String>,
-    /// Fix all predictions to a template: line, pair, square or triangular-lattice.
-    #[arg(long, value_name = "TEMPLATE", allow_hyphen_values = true)]
-    predefine: Option<String>,
-    /// Fix only the predictions that the template sets: line (sensor model c).
-    #[arg(long, value_name = "TEMPLATE", allow_hyphen_values = true)]
-    predefine_partly: Option<String>,
-    /// Genomes of a generation [default: 50].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    population: Option<String>,
-    /// Generations [default: 100].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    generations: Option<String>,
-    /// Repetitions of an evaluation; the worst counts [default: 10].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    repetitions: Option<String>,
-    /// Steps of a repetition [default: 500].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    steps: Option<String>,
-    /// Probability that a weight mutates [default: 0.1; 0.3 for the partly predefined line on
-    /// 20x20].
-    #[arg(long, value_name = "P", allow_hyphen_values = true)]
-    mutation: Option<String>,
-    /// Start from a genome and its mutants.
-    #[arg(long, value_name = "GENOME")]
-    from: Option<PathBuf>,
-    /// Root of all random numbers; drawn and printed if not given.
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    seed: Option<String>,
-    /// Threads [default: one a core]; the result does not depend on them.
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    threads: Option<String>,
-    /// Directory of the run; must not exist [default: a new one in runs/].
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    settings: SettingFlags,
     /// Go on with a run that was interrupted, under the settings in its directory.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["config", "grid", "robots",
-        "sensor_model", "noise", "predefine", "predefine_partly", "population", "generations",
-        "repetitions", "steps", "mutation", "from", "seed", "out"])]
+    #[arg(long, value_name = "DIR", conflicts_with = "config")]
     resume: Option<PathBuf>,
     /// How progress is shown.
     #[arg(long, value_enum, default_value_t)]
@@ -92,30 +49,9 @@ pub struct EvolveArgs {
 }
 
 impl EvolveArgs {
-    /// All settings given, flags before the file.
-    fn given(&self) -> Result<Given, SettingError> {
-        let mut given = Given::default();
-        let flags = [
-            ("grid", &self.grid),
-            ("robots", &self.robots),
-            ("sensor-model", &self.sensor_model),
-            ("noise", &self.noise),
-            ("predefine", &self.predefine),
-            ("predefine-partly", &self.predefine_partly),
-            ("population", &self.population),
-            ("generations", &self.generations),
-            ("repetitions", &self.repetitions),
-            ("steps", &self.steps),
-            ("mutation", &self.mutation),
-            ("seed", &self.seed),
-            ("threads", &self.threads),
-        ];
-        for (key, value) in flags {
-            given.flag(key, value.as_deref());
-        }
-        for (key, path) in [("from", &self.from), ("out", &self.out)] {
-            given.flag(key, path.as_deref().map(text_of_path).as_deref());
-        }
+    /// All settings given; flags override the file.
+    fn given(&self) -> Result<Overrides, SettingError> {
+        let mut given = self.settings.0.clone();
         if let Some(path) = &self.config {
             given.file(path)?;
         }
@@ -148,9 +84,9 @@ struct Manner {
 /// [`BadInput`] before anything is written; other errors leave a run that can be resumed.
 pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
     let given = arguments.given().map_err(unusable)?;
-    let threads = settings::threads(&given).map_err(BadInput::new)?;
+    let threads = given.threads().map_err(BadInput::new)?;
     if arguments.open {
-        terminal::check().map_err(|error| BadInput::new(format!("--open: {error}")))?;
+        check_terminal().map_err(|error| BadInput::new(format!("--open: {error}")))?;
     }
     let manner = Manner {
         progress: arguments.progress,
@@ -186,8 +122,11 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
         }
         None => {
             let settings = Settings::resolve(&given, draw_seed).map_err(BadInput::new)?;
-            let seed = settings.seed;
-            let directory = settings::out(&given).unwrap_or_else(|| "runs".into());
+            let seed = settings.seed();
+            let directory = given
+                .out()
+                .map_err(BadInput::new)?
+                .unwrap_or_else(|| "runs".into());
             let needs = Needs::of_evolution(&settings, limits::threads(threads));
             needs.check_memory().map_err(BadInput::new)?;
             needs.check_disk(&directory).map_err(BadInput::new)?;
@@ -197,14 +136,15 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
                 tell!("{said}");
             }
             let experiment = Experiment::new(settings);
-            let run = match settings::out(&given) {
+            let program = this_program();
+            let run = match given.out().map_err(BadInput::new)? {
                 Some(path) => {
                     remove_abandoned(files::parent(&path));
-                    RunDir::create(&path, &experiment)
+                    RunDir::create(&path, &experiment, &program)
                 }
                 None => {
                     remove_abandoned(Path::new("runs"));
-                    RunDir::create_named(Path::new("runs"), &experiment)
+                    RunDir::create_named(Path::new("runs"), &experiment, &program)
                 }
             }
             .map_err(|error| match given.place("out") {
@@ -230,12 +170,15 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
 }
 
 fn draw_seed() -> u64 {
-    rand::random_range(0..=settings::DRAWN_SEED_MAX)
+    rand::random_range(0..=DRAWN_SEED_MAX)
 }
 
 /// Plays a run that has ended.
 fn watch(directory: &Path, stop: &AtomicBool) -> anyhow::Result<Exit> {
-    let recording = Recording::of_run(&terminal_path(directory), &FinishedRun::read(directory)?)?;
+    let finished = FinishedRun::read(directory)?;
+    let recording = computing(finished.settings.scenario(), |after_step| {
+        Recording::of_run(&terminal_path(directory), &finished, after_step)
+    })?;
     in_terminal(&recording, Colouring::default(), stop)
 }
 
@@ -268,7 +211,7 @@ fn generations(
             "hash": finding.hash.to_string(),
             "run": text_of_path(run.path()),
         });
-        settings::add_seed(&mut done, experiment.settings().seed);
+        add_seed(&mut done, experiment.settings().seed());
         show_line!("{done}");
     } else {
         show!("\n{}", summary::evolved(&experiment, &finding, run.path()));

@@ -3,14 +3,14 @@
 use super::errors::unusable;
 use super::replay::write_file;
 use super::{BadInput, flag, genome_file, read_genome};
-use crate::files::Existing;
-use crate::finished_run::FinishedRun;
-use crate::limits::Needs;
 use crate::report::embedding::{self, c_header, intel_hex, probe_rs_line, rust_source, slot};
-use crate::settings::count;
-use crate::text::{checked_identifier, terminal_path};
 use clap::{Args, ValueEnum};
 use minimal_surprise_controller::EncodedGenome;
+use minimal_surprise_evolution::files::Existing;
+use minimal_surprise_evolution::finished_run::FinishedRun;
+use minimal_surprise_evolution::limits::Needs;
+use minimal_surprise_evolution::settings::count;
+use minimal_surprise_evolution::text::{checked_identifier, terminal_path};
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_slots::MADE_WRITE_COUNT_MAX;
 use std::io::IsTerminal;
@@ -127,13 +127,13 @@ fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
         .into());
     }
     let finished = FinishedRun::read_and_check(&arguments.from).map_err(unusable)?;
-    let needs = Needs::of_trajectory(&finished.settings.scenario);
+    let needs = Needs::of_trajectory(finished.settings.scenario());
     needs.check_memory().map_err(BadInput::new)?;
     if let Some(out) = &arguments.out {
         needs.check_disk(out).map_err(BadInput::new)?;
     }
     let trace = finished.trace()?;
-    let grid = finished.settings.scenario.grid();
+    let grid = finished.settings.scenario().grid();
     let mut text = Vec::new();
     Trajectory::of_trace(finished.provenance.generation, grid, &trace).write(&mut text)?;
     Ok(text)

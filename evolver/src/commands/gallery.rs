@@ -3,10 +3,10 @@
 use super::errors::{name_damaged, unusable};
 use super::{thread_pool, threads_flag};
 use crate::exit::Exit;
-use crate::files::Existing;
-use crate::replay::gallery::write;
-use crate::text::terminal_path;
 use clap::Args;
+use minimal_surprise_evolution::files::Existing;
+use minimal_surprise_evolution::text::terminal_path;
+use minimal_surprise_replay::gallery::write;
 use std::path::PathBuf;
 
 /// Which runs, and where to.

@@ -1,20 +1,20 @@
 //! `evolver hil`: a simulated swarm with the robot on the line in it.
 
-use super::conditions::GenomeConditions;
 use super::errors::unusable;
 use super::port::{PortArgs, failed};
+use super::setting_flags::GenomeConditions;
 use super::{BadInput, read_genome};
 use crate::exit::Exit;
-use crate::finished_run::FinishedRun;
 use crate::hil::{Course, HilError, Ran};
-use crate::limits::Needs;
 use crate::report::progress;
 use crate::robot::{Afterwards, Robot, RobotError, describe, is_in_use};
-use crate::run_files::BEST;
-use crate::text::{shell_path, terminal_path};
 use clap::Args;
 use indicatif::ProgressBar;
 use minimal_surprise_controller::{Controller, EncodedGenome};
+use minimal_surprise_evolution::finished_run::FinishedRun;
+use minimal_surprise_evolution::limits::Needs;
+use minimal_surprise_evolution::run_files::BEST;
+use minimal_surprise_evolution::text::{shell_path, terminal_path};
 use minimal_surprise_sim::SeedTree;
 use std::path::{Path, PathBuf};
 
@@ -94,7 +94,7 @@ fn of_run(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
     let finished = FinishedRun::read_and_check(directory).map_err(unusable)?;
     let course = Course {
         controller: Controller::new(&finished.genome),
-        scenario: finished.settings.scenario,
+        scenario: *finished.settings.scenario(),
         trial: finished.trial(),
     };
     Ok((course, directory.join(BEST)))
@@ -107,8 +107,10 @@ fn of_genome(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
     let settings = arguments.conditions.settings(&encoded)?;
     let course = Course {
         controller: Controller::from_encoded(&encoded),
-        scenario: settings.scenario,
-        trial: settings.scenario.trial(SeedTree::new(settings.seed), 0, 0),
+        scenario: *settings.scenario(),
+        trial: settings
+            .scenario()
+            .trial(SeedTree::new(settings.seed()), 0, 0),
     };
     Ok((course, Path::new(&arguments.run).to_owned()))
 }

@@ -2,13 +2,13 @@
 
 use super::errors::unusable;
 use super::{BadInput, flag};
-use crate::files::{self, DATA_BYTES_MAX, FileError};
-use crate::new_dir::{NewDir, remove_abandoned};
-use crate::settings::{Given, describe, resolve_topology};
-use crate::text::terminal_path;
 use clap::Args;
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
 use minimal_surprise_controller::{Prediction, Provenance, SensorModel, Template, Topology};
+use minimal_surprise_evolution::files::{self, DATA_BYTES_MAX, FileError};
+use minimal_surprise_evolution::new_dir::{NewDir, remove_abandoned};
+use minimal_surprise_evolution::settings::{Overrides, describe};
+use minimal_surprise_evolution::text::terminal_path;
 use minimal_surprise_sim::exchange::{
     ExchangeError, GenomeRows, ImportedGenome, generations, import_genome,
 };
@@ -121,7 +121,7 @@ fn read(path: &Path, only: Option<u32>) -> anyhow::Result<Vec<(u32, GenomeRows)>
 /// As the flags say; what they leave open, by the length to which rows are filled up.
 fn topology(arguments: &ImportArgs, action: &[(u32, GenomeRows)]) -> Result<Topology, BadInput> {
     let length = action.first().map_or(0, |(_, rows)| rows.rows[0].len());
-    let mut given = Given::default();
+    let mut given = Overrides::default();
     given.flag("sensor-model", arguments.sensor_model.as_deref());
     given.flag("predefine", arguments.predefine.as_deref());
     given.flag("predefine-partly", arguments.predefine_partly.as_deref());
@@ -130,9 +130,11 @@ fn topology(arguments: &ImportArgs, action: &[(u32, GenomeRows)]) -> Result<Topo
         48 => "b",
         _ => "c",
     };
-    given.flag_if_missing("sensor-model", model);
+    if given.place("sensor-model").is_none() {
+        given.flag("sensor-model", Some(model));
+    }
     let free = given.place("predefine").is_none() && given.place("predefine-partly").is_none();
-    let topology = resolve_topology(&given).map_err(BadInput::new)?;
+    let topology = given.topology().map_err(BadInput::new)?;
     if free && arguments.prediction.is_none() {
         return Err(BadInput::new(
             "--prediction is missing; without it, name the template with --predefine",

@@ -2,7 +2,6 @@
 
 pub mod bench;
 pub mod classify;
-pub mod conditions;
 pub mod damage;
 pub mod errors;
 pub mod evaluate;
@@ -17,18 +16,19 @@ pub mod monitor;
 pub mod pictures;
 pub mod port;
 pub mod replay;
+pub mod setting_flags;
 pub mod start;
 pub mod suite;
 
 pub use errors::{BadInput, Interrupted, exit_of};
 
-use crate::files;
-use crate::finished_run::require;
-use crate::run_files::{BEST, DONE};
-use crate::settings::thread_count;
 use errors::unusable;
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
+use minimal_surprise_evolution::files;
+use minimal_surprise_evolution::finished_run::require;
+use minimal_surprise_evolution::run_files::{BEST, DONE};
+use minimal_surprise_evolution::settings::{THREADS_MAX, count};
 use std::path::{Path, PathBuf};
 
 /// The threads to work on; one a core if no number is given.
@@ -53,7 +53,7 @@ fn flag<T>(
 fn threads_flag(given: &Option<String>) -> Result<Option<u32>, BadInput> {
     let given = given.as_deref();
     given
-        .map(|text| flag("threads", text, thread_count))
+        .map(|text| flag("threads", text, |text| count(text, THREADS_MAX)))
         .transpose()
 }
 

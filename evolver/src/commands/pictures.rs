@@ -2,15 +2,15 @@
 
 use super::replay::{refuse_existing, write_file};
 use super::{BadInput, flag};
-use crate::files::Existing;
-use crate::replay::palette::{DARK, LIGHT, Theme};
-use crate::replay::pictures::film::Film;
-use crate::replay::pictures::raster::png;
-use crate::replay::pictures::{Drawing, Look, PictureError, Size, What, still};
-use crate::replay::recording::Recording;
-use crate::replay::scene::Colouring;
-use crate::settings::count;
 use clap::{ArgGroup, Args, ValueEnum};
+use minimal_surprise_evolution::files::Existing;
+use minimal_surprise_evolution::settings::count;
+use minimal_surprise_replay::palette::{DARK, LIGHT, Theme};
+use minimal_surprise_replay::pictures::film::Film;
+use minimal_surprise_replay::pictures::raster::png;
+use minimal_surprise_replay::pictures::{Drawing, Look, PictureError, Size, What, still};
+use minimal_surprise_replay::recording::Recording;
+use minimal_surprise_replay::scene::Colouring;
 use std::path::{Path, PathBuf};
 
 /// Which pictures to write, and what they look like.

@@ -3,10 +3,10 @@
 use super::{BadInput, Interrupted, flag};
 use crate::report::summary::program;
 use crate::robot::{PortName, Problem, Robot, RobotError, standing};
-use crate::settings::count;
 use crate::signals::{ask_then_end, stop};
-use crate::text::shell_path;
 use clap::Args;
+use minimal_surprise_evolution::settings::count;
+use minimal_surprise_evolution::text::shell_path;
 use std::path::PathBuf;
 use std::time::Duration;
 

@@ -1,27 +1,34 @@
 //! `evolver replay`: look at a run.
 
-use super::conditions::GenomeConditions;
 use super::damage::corners;
 use super::errors::unusable;
 use super::pictures::PictureArgs;
+use super::setting_flags::GenomeConditions;
 use super::{BadInput, flag, read_genome};
 use crate::exit::Exit;
-use crate::files::{self, DATA_BYTES_MAX, Existing};
-use crate::finished_run::FinishedRun;
-use crate::limits::Needs;
-use crate::replay::page::{check_page, page};
-use crate::replay::recording::{Origin, Recording};
-use crate::replay::scene::Colouring;
-use crate::replay::terminal::{self, PlayError};
+use crate::output;
+use crate::report::progress::computing;
 use crate::signals::{ask_to_stop, on_signal, stop};
-use crate::text::{self, TextError, terminal_path};
+use anyhow::Context;
 use clap::Args;
 use minimal_surprise_controller::EncodedGenome;
+use minimal_surprise_evolution::files::{self, DATA_BYTES_MAX, Existing};
+use minimal_surprise_evolution::finished_run::FinishedRun;
+use minimal_surprise_evolution::limits::Needs;
+use minimal_surprise_evolution::text::{self, TextError, terminal_path};
+use minimal_surprise_replay::page::{check_page, page};
+use minimal_surprise_replay::recording::{Origin, Recording};
+use minimal_surprise_replay::scene::Colouring;
+use minimal_surprise_replay::terminal;
+use minimal_surprise_replay::terminal::paints::Paints;
 use minimal_surprise_sim::damage::Damage;
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::{Area, Scenario, SeedTree};
+use std::env;
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use supports_color::Stream;
 
 /// The keys of the terminal.
 const KEYS: &str = "\
@@ -116,14 +123,41 @@ pub(super) fn in_terminal(
     colouring: Colouring,
     stop: &AtomicBool,
 ) -> anyhow::Result<Exit> {
-    match terminal::play(recording, colouring, stop) {
-        Err(error @ (PlayError::NotATerminal | PlayError::NoCodes(_))) => Err(BadInput::new(
-            format!("{error}; --html, --svg, --png, --gif and --mp4 write files instead"),
-        )
-        .into()),
+    check_terminal().map_err(|error| {
+        BadInput::new(format!(
+            "{error}; --html, --svg, --png, --gif and --mp4 write files instead"
+        ))
+    })?;
+    let ascii = output::stdout_is_ascii();
+    match terminal::play(recording, colouring, paints(), ascii, stop) {
         // A terminal that closes fails, too.
         _ if stop.load(Ordering::Relaxed) => Ok(Exit::Interrupted),
-        played => Ok(played.map(|()| Exit::Done)?),
+        played => played.map(|()| Exit::Done).context("the terminal"),
+    }
+}
+
+/// Whether standard output is a terminal to play a replay in.
+pub(super) fn check_terminal() -> Result<(), String> {
+    if !io::stdout().is_terminal() {
+        Err("standard output is not a terminal to play the replay in".to_owned())
+    } else if !output::terminal_has_codes() {
+        let term = env::var_os("TERM").unwrap_or_default();
+        Err(format!(
+            "this terminal (TERM={}) cannot play the replay: it only prints lines",
+            term.to_string_lossy()
+        ))
+    } else {
+        Ok(())
+    }
+}
+
+/// The colours that the environment allows: `COLORTERM`, `TERM`, `NO_COLOR`.
+fn paints() -> Paints {
+    match supports_color::on(Stream::Stdout) {
+        Some(level) if level.has_16m => Paints::True,
+        Some(level) if level.has_256 => Paints::Indexed,
+        Some(level) if level.has_basic => Paints::Sixteen,
+        _ => Paints::None,
     }
 }
 
@@ -197,8 +231,8 @@ fn of_run(
     name: &str,
     finished: &FinishedRun,
 ) -> Result<Recording, BadInput> {
-    check_size(arguments, &finished.settings.scenario)?;
-    let grid = finished.settings.scenario.grid();
+    check_size(arguments, finished.settings.scenario())?;
+    let grid = finished.settings.scenario().grid();
     let areas = [
         ("remove", &arguments.remove, Damage::Remove as fn(Area) -> _),
         ("reposition", &arguments.reposition, Damage::Reposition),
@@ -208,14 +242,20 @@ fn of_run(
         Some((flag, text, damage))
     });
     let Some((name_of_flag, text, damage)) = given else {
-        return Recording::of_run(name, finished).map_err(BadInput::new);
+        return computing(finished.settings.scenario(), |after_step| {
+            Recording::of_run(name, finished, after_step)
+        })
+        .map_err(BadInput::new);
     };
     let about = |error: &dyn std::fmt::Display| {
         BadInput::new(format!("--{name_of_flag} = {text}: {error}"))
     };
     let [x0, y0, x1, y1] = flag(name_of_flag, text, corners)?;
     let area = Area::new(grid, x0, y0, x1, y1).map_err(|error| about(&error))?;
-    Recording::of_damage(name, finished, damage(area)).map_err(|error| about(&error))
+    computing(finished.settings.scenario(), |after_step| {
+        Recording::of_damage(name, finished, damage(area), after_step)
+    })
+    .map_err(|error| about(&error))
 }
 
 /// Refuses what this machine cannot hold, or a page cannot, before a step is computed.
@@ -236,16 +276,19 @@ fn of_genome(arguments: &ReplayArgs, path: &Path, name: &str) -> anyhow::Result<
     let bytes = read_genome(path)?;
     let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
     let settings = conditions.settings(&encoded)?;
-    let seeds = SeedTree::new(settings.seed);
+    let seeds = SeedTree::new(settings.seed());
     let origin = Origin {
         name: name.to_owned(),
-        seed: Some(settings.seed),
-        noise: settings.written.noise,
+        seed: Some(settings.seed()),
+        noise: settings.noise(),
         ..Origin::default()
     };
-    let scenario = &settings.scenario;
+    let scenario = settings.scenario();
     check_size(arguments, scenario)?;
     let trial = scenario.trial(seeds, 0, 0);
-    let recording = Recording::of_trial(&encoded.to_genome(), scenario, &trial, origin);
+    let genome = encoded.to_genome();
+    let recording = computing(scenario, |after_step| {
+        Recording::of_trial(&genome, scenario, &trial, origin, after_step)
+    });
     Ok(recording.map_err(BadInput::new)?)
 }

@@ -2,26 +2,29 @@
 
 use super::errors::{Unfinished, name_damaged, stopped, unusable};
 use super::{BadInput, flag, thread_pool, threads_flag};
-use crate::damaged_runs::DamagedRuns;
 use crate::exit::Exit;
-use crate::files::{self, Existing, FileError, TEXT_BYTES_MAX};
-use crate::finished_run::{Progress, ReadRunError};
-use crate::limits::{self, Needs, NeedsOfRuns};
-use crate::lock::Holder;
-use crate::new_dir::remove_abandoned;
-use crate::replay::gallery;
 use crate::report::progress::ProgressMode;
 use crate::report::suite_progress::{SearchProgress, SuiteProgress, robot_steps};
-use crate::run_dir::{RunDir, tidy};
-use crate::settings::count;
 use crate::signals::stop_on_signal;
 use crate::suite::plan::{Plan, PlannedRun, RUNS, Runs};
-use crate::suite::report::{self, gather::Gathered};
+use crate::suite::report;
+use crate::suite::report::gather::Gathered;
 use crate::suite::search::{Search, look};
 use crate::suite::work::{Shard, Waiting, Worked, progress, work_on};
 use crate::suite::{PAPER, Resilience, Suite, slurm};
-use crate::text::{file_name_except, hex, shell_path, shell_word, terminal_path};
 use clap::{Args, Subcommand, ValueEnum};
+use minimal_surprise_evolution::damaged_runs::DamagedRuns;
+use minimal_surprise_evolution::files::{self, Existing, FileError, TEXT_BYTES_MAX};
+use minimal_surprise_evolution::finished_run::{Progress, ReadRunError};
+use minimal_surprise_evolution::limits::{self, Needs, NeedsOfRuns};
+use minimal_surprise_evolution::lock::Holder;
+use minimal_surprise_evolution::new_dir::remove_abandoned;
+use minimal_surprise_evolution::run_dir::{RunDir, tidy};
+use minimal_surprise_evolution::settings::count;
+use minimal_surprise_evolution::text::{
+    file_name_except, hex, shell_path, shell_word, terminal_path,
+};
+use minimal_surprise_replay::gallery;
 use minimal_surprise_sim::Path as CodePath;
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -343,7 +346,7 @@ fn needs_of_report(plan: &Plan, suite: &Suite) -> Needs {
             .chain(damage.map(|asked| ("repeat", asked.repeat)))
             .collect();
         for settings in experiment.settings().filter(|_| !starts.is_empty()) {
-            let scenario = [(settings.settings.scenario, ())];
+            let scenario = [(*settings.settings.scenario(), ())];
             for &starts in &starts {
                 let needs = Needs::of_starts(&scenario, starts, limits::threads(None));
                 if needs.memory() > most.memory() {
@@ -452,7 +455,7 @@ fn print_plan(plan: &Plan, suite: &Suite, searches: &[Resilience]) {
         .by_settings()
         .map(|alike| {
             let settings = alike.settings();
-            let generations = f64::from(settings.generations) * alike.number() as f64;
+            let generations = f64::from(settings.generations()) * alike.number() as f64;
             settings.robot_steps_per_generation() as f64 * generations
         })
         .sum();

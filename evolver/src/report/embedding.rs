@@ -1,10 +1,10 @@
 //! Genomes for those who link them into a firmware or write them to a chip.
 
 use crate::robot::length_and_crc;
-use crate::settings::describe;
-use crate::text::{identifier, shell_path, shell_word};
 use ihex::{Record, create_object_file_representation};
 use minimal_surprise_controller::EncodedGenome;
+use minimal_surprise_evolution::settings::describe;
+use minimal_surprise_evolution::text::{identifier, shell_path, shell_word};
 use minimal_surprise_slots::Header;
 use std::path::Path;
 

@@ -6,7 +6,6 @@ pub mod reevaluation;
 pub mod structures;
 pub mod suite_progress;
 pub mod summary;
-pub mod tables;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 

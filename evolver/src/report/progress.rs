@@ -1,11 +1,11 @@
 //! Progress of a run: a bar, lines, JSON, or nothing.
 
-use crate::experiment::GenerationRecord;
 use crate::output;
-use crate::settings::Settings;
 use clap::ValueEnum;
 use console::Term;
 use indicatif::{ProgressBar, ProgressStyle};
+use minimal_surprise_evolution::experiment::GenerationRecord;
+use minimal_surprise_evolution::settings::Settings;
 use minimal_surprise_sim::Scenario;
 use std::time::{Duration, Instant};
 
@@ -66,10 +66,19 @@ impl Shown {
 /// Robot-steps from which on a run that is computed in one go takes seconds.
 const LONG_ROBOT_STEPS: u64 = 2_000_000;
 
+/// Computes a run in one go, showing its steps if it takes seconds; `compute` gets what is to be
+/// called after every step.
+pub fn computing<T>(scenario: &Scenario, compute: impl FnOnce(&dyn Fn()) -> T) -> T {
+    let bar = steps_bar(scenario);
+    let computed = compute(&|| bar.inc(1));
+    bar.finish_and_clear();
+    computed
+}
+
 /// A bar for a run that is computed in one go, hidden if that is quick. Where no bar can be drawn, a
 /// line says what is going on.
 #[must_use]
-pub fn steps_bar(scenario: &Scenario) -> ProgressBar {
+fn steps_bar(scenario: &Scenario) -> ProgressBar {
     let (robots, steps) = (scenario.robots(), scenario.steps());
     if u64::from(robots) * u64::from(steps) < LONG_ROBOT_STEPS {
         return ProgressBar::hidden();
@@ -106,15 +115,15 @@ impl Progress {
     /// Starts the clock. `done` generations lie before this process.
     #[must_use]
     pub fn start(mode: ProgressMode, settings: &Settings, done: u32) -> Self {
-        let bar = || ProgressBar::new(settings.generations.into()).with_position(done.into());
+        let bar = || ProgressBar::new(settings.generations().into()).with_position(done.into());
         Self {
             shown: Shown::new(mode, "{pos}/{len}", bar),
             started: Instant::now(),
             generations_before: done,
-            generations: settings.generations,
+            generations: settings.generations(),
             robot_steps_per_generation: settings.robot_steps_per_generation(),
             scored_bits: settings.scored_bits() as f64,
-            population: f64::from(settings.population),
+            population: f64::from(settings.population()),
         }
     }
 

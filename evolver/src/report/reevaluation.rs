@@ -1,10 +1,10 @@
 //! Tables of re-evaluations and of resilience to damage.
 
-use super::structures::{name_list, names_in_words};
-use crate::reevaluation::{Rerun, ResilienceRow, mean, median};
-use crate::settings::add_seed;
+use minimal_surprise_evolution::reevaluation::{Rerun, ResilienceRow, mean, median};
+use minimal_surprise_evolution::run_files::{self, SCHEMA_VERSION};
+use minimal_surprise_evolution::settings::add_seed;
 use minimal_surprise_sim::Scenario;
-use minimal_surprise_sim::structures::{LineOrientation, Structure};
+use minimal_surprise_sim::structures::{LineOrientation, Structure, in_words};
 use serde_json::{Map, Value, json};
 
 /// One combination of conditions, and its runs.
@@ -105,7 +105,7 @@ pub fn conditions_json(conditions: &[Condition], seed: u64) -> Value {
                 .map(|rerun| {
                     json!({
                         "fitness": rerun.fitness,
-                        "names": name_list(&rerun.names),
+                        "names": run_files::names(&rerun.names),
                         "orientation": rerun.orientation.map(|o| o.name()),
                     })
                 })
@@ -123,7 +123,7 @@ pub fn conditions_json(conditions: &[Condition], seed: u64) -> Value {
         })
         .collect();
     let mut object = json!({
-        "schema_version": super::tables::SCHEMA_VERSION,
+        "schema_version": SCHEMA_VERSION,
         "conditions": rows,
     });
     add_seed(&mut object, seed);
@@ -163,7 +163,7 @@ pub fn resilience_text(structure: Structure, rows: &[ResilienceRow]) -> String {
     }
     format!(
         "structure: {}; mean (median)\n\n{}",
-        names_in_words(&[structure]),
+        in_words(&[structure]),
         super::right_aligned(table, &[1, 2, 3, 4, 5, 6])
     )
 }
@@ -189,7 +189,7 @@ pub fn resilience_json(structure: Structure, rows: &[ResilienceRow]) -> Value {
         })
         .collect();
     json!({
-        "schema_version": super::tables::SCHEMA_VERSION,
+        "schema_version": SCHEMA_VERSION,
         "structure": structure.name(),
         "rows": rows,
     })

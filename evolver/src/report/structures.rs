@@ -1,8 +1,9 @@
 //! What a swarm formed, as a picture and a table or as JSON.
 
 use super::summary::picture;
+use minimal_surprise_evolution::run_files::{MeasuresOfRun, SCHEMA_VERSION, names};
 use minimal_surprise_sim::metrics::Measures;
-use minimal_surprise_sim::structures::{LineCounts, Structure, Structures};
+use minimal_surprise_sim::structures::{LineCounts, Structure, Structures, in_words};
 use minimal_surprise_sim::{Grid, Pose};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -23,18 +24,7 @@ pub struct Classified<'a> {
 /// The run's name in words: `lines`, `lines and pairs (tied)`, `nothing`.
 #[must_use]
 pub fn name(found: &Structures) -> String {
-    names_in_words(&found.names())
-}
-
-/// Names in words.
-#[must_use]
-pub fn names_in_words(names: &[Structure]) -> String {
-    let words: Vec<&str> = names.iter().map(|structure| structure.name()).collect();
-    match words.as_slice() {
-        [] => "nothing".to_owned(),
-        [one] => (*one).to_owned(),
-        several => format!("{} (tied)", several.join(" and ")),
-    }
+    in_words(&found.names())
 }
 
 /// The picture: the robots of the structure that the run is named after stand out.
@@ -143,10 +133,10 @@ pub fn json(classified: &Classified<'_>) -> Value {
     let lines = found.line_counts();
     let clusters = found.clusters();
     json!({
-        "schema_version": super::tables::SCHEMA_VERSION,
+        "schema_version": SCHEMA_VERSION,
         "grid": classified.grid.to_string(),
         "robots": classified.poses.len(),
-        "names": name_list(&found.names()),
+        "names": names(&found.names()),
         "structures": structures,
         "lines": {
             "horizontal": lines.horizontal,
@@ -159,25 +149,6 @@ pub fn json(classified: &Classified<'_>) -> Value {
             "connections": clusters.connections(),
         },
         "average_prediction": classified.measures.map(Measures::average_prediction),
-        "measures": classified.measures.map(measures_json),
-    })
-}
-
-/// Names as JSON.
-#[must_use]
-pub fn name_list(names: &[Structure]) -> Value {
-    names.iter().map(|structure| structure.name()).collect()
-}
-
-/// Measures of a run as JSON.
-#[must_use]
-pub fn measures_json(measures: &Measures) -> Value {
-    json!({
-        "fitness": measures.fitness(),
-        "movement": measures.movement(),
-        "intended_movement": measures.intended_movement(),
-        "period_steps": measures.period(),
-        "temperature": measures.temperature(),
-        "surprise": measures.surprise(),
+        "measures": classified.measures.map(MeasuresOfRun::from),
     })
 }

@@ -1,11 +1,11 @@
 //! Progress of a suite: suite, experiment and run level, with the time left by what was measured.
 
 use super::progress::{ProgressMode, Shown, seconds};
-use crate::lock::{self, Holder};
 use crate::output::for_stderr;
-use crate::settings::add_seed;
-use crate::suite::plan::{Plan, PlannedRun, label};
+use crate::suite::plan::{Plan, PlannedRun};
 use indicatif::ProgressBar;
+use minimal_surprise_evolution::lock::{self, Holder};
+use minimal_surprise_evolution::settings::add_seed;
 use std::cell::{Cell, RefCell};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -61,7 +61,7 @@ impl<'a> SuiteProgress<'a> {
             Shown::Bar(bar) => bar.set_message(format!(
                 "{}  generation {generation}/{}{}",
                 for_stderr(&self.label(run)),
-                run.settings.generations,
+                run.settings.generations(),
                 self.left_in_words()
             )),
             Shown::Json => show_event!(
@@ -71,7 +71,7 @@ impl<'a> SuiteProgress<'a> {
                     "run": run.id,
                     "label": self.label(run),
                     "generation": generation,
-                    "generations": run.settings.generations,
+                    "generations": run.settings.generations(),
                 })
             ),
             Shown::Lines | Shown::Nothing => {}
@@ -81,7 +81,7 @@ impl<'a> SuiteProgress<'a> {
     /// A run is complete.
     pub fn completed(&self, run: &PlannedRun) {
         self.completed.set(self.completed.get() + 1);
-        self.settle(run, run.settings.generations);
+        self.settle(run, run.settings.generations());
         let done = self.done_before + self.completed.get();
         match &self.shown {
             Shown::Bar(bar) => bar.set_position(done),
@@ -171,11 +171,11 @@ impl SearchProgress {
 
     /// A run begins, the so many-th beyond the plan.
     pub fn begins(&self, run: &PlannedRun, number: u32, experiment: &str) {
-        let label = label(&run.settings);
+        let label = &run.label;
         match &self.shown {
             Shown::Bar(bar) => {
                 bar.set_position(number.into());
-                bar.set_message(format!("{}, seed {}", for_stderr(&label), run.seed));
+                bar.set_message(format!("{}, seed {}", for_stderr(label), run.seed));
             }
             Shown::Lines => tell!(
                 "{experiment}: run {number} beyond the plan, {label}, seed {}",
@@ -233,7 +233,7 @@ fn waits(shown: &Shown, run: &PlannedRun, directory: &Path, holder: Option<&Hold
 /// The robot-steps of a whole run.
 #[must_use]
 pub fn robot_steps(run: &PlannedRun) -> u64 {
-    until(run, run.settings.generations)
+    until(run, run.settings.generations())
 }
 
 fn until(run: &PlannedRun, generation: u32) -> u64 {

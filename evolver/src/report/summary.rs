@@ -1,15 +1,15 @@
 //! Words and pictures for people at the end of a run, and about a genome.
 
 use super::structures::{self, Classified};
-use crate::experiment::{Experiment, Finding};
 use crate::output::stdout_is_ascii;
-use crate::run_files::{BEST, CONFIG};
-use crate::settings::{describe, model_name};
-use crate::text::shell_path;
 use console::{Style, Term};
 use minimal_surprise_controller::codec::FORMAT_VERSION;
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{EncodedGenome, KERNEL_ID};
+use minimal_surprise_evolution::experiment::{Experiment, Finding};
+use minimal_surprise_evolution::run_files::{BEST, CONFIG};
+use minimal_surprise_evolution::settings::{describe, model_name};
+use minimal_surprise_evolution::text::shell_path;
 use minimal_surprise_sim::drawing::draw_members;
 use minimal_surprise_sim::{Grid, Pose};
 use std::fmt::Write;
@@ -58,7 +58,7 @@ pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> S
 pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> String {
     let settings = experiment.settings();
     let classified = Classified {
-        grid: settings.scenario.grid(),
+        grid: settings.scenario().grid(),
         poses: &finding.outcome.final_poses,
         found: &finding.structures,
         measures: Some(&finding.measures),
@@ -91,8 +91,8 @@ pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> 
         share = 100.0 * finding.share(),
         fitness = finding.outcome.fitness(),
         generation = finding.provenance.generation,
-        repetitions = settings.repetitions,
-        seed = settings.seed,
+        repetitions = settings.repetitions(),
+        seed = settings.seed(),
         hash = finding.hash,
     )
 }

@@ -1,7 +1,7 @@
 //! One serial port, and one question after another over it.
 
 use super::error::{Doing, Heard, OtherReader, Problem, RobotError};
-use crate::text::terminal_path;
+use minimal_surprise_evolution::text::terminal_path;
 use minimal_surprise_link::{Client, MalformedMessage, Refusal, Reply, Request};
 use serialport::SerialPort;
 use std::fmt;

@@ -11,9 +11,9 @@ pub use error::{Doing, Heard, OtherReader, Problem, RobotError};
 pub use held::{Afterwards, standing};
 pub use line::PortName;
 
-use crate::text::terminal;
 use line::{Line, is_lost_session};
 use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Surprise};
+use minimal_surprise_evolution::text::terminal;
 use minimal_surprise_link::{
     CHUNK_BYTES_MAX, Faults, GenomeInUse, LineCounters, Reply, Report, Request, Stepped,
 };

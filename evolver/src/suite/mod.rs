@@ -1,7 +1,7 @@
 //! Suites: many evolutions described as data, the paper's among them.
 //!
-//! A suite is a TOML file. Each experiment is the product of its lists: every sensor model on every
-//! grid, and so on, so many runs each. [`plan`] turns it into runs with names, [`work`] says which
+//! A suite is a TOML file. Every combination of the values that an experiment lists is run `runs`
+//! times. [`plan`] turns it into runs with names, [`work`] says which
 //! are done and does the others, [`search`] evolves on where a structure is wanted that none has.
 //!
 //! ```toml
@@ -14,16 +14,19 @@
 //! robots = [50, 100]
 //! ```
 
+mod experiment_table;
 pub mod plan;
 pub mod report;
 pub mod search;
 pub mod slurm;
 pub mod work;
 
-use crate::files::{self, FileError, TEXT_BYTES_MAX};
-use crate::text::{self, is_hidden};
+use minimal_surprise_evolution::files::{self, FileError, TEXT_BYTES_MAX};
+use minimal_surprise_evolution::settings::{Setting, setting};
+use minimal_surprise_evolution::text::{self, is_hidden};
 use minimal_surprise_sim::Structure;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The suite of the paper's experimental section.
@@ -49,45 +52,21 @@ pub struct Suite {
     pub resiliences: Vec<Resilience>,
 }
 
-/// Evolutions under every combination of the listed settings.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+/// Evolutions under every combination of the listed values of settings.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Experiment {
     /// Its name.
     pub name: String,
     /// Runs of every combination, seeds from [`Experiment::first_seed`] on.
     pub runs: u32,
-    /// Grids, as in `15x15`.
-    #[serde(default = "default_grids")]
-    pub grids: Vec<String>,
-    /// Swarm sizes.
-    #[serde(default = "default_robots")]
-    pub robots: Vec<u32>,
-    /// Sensor models.
-    #[serde(default = "default_models")]
-    pub sensor_models: Vec<String>,
-    /// Noise levels.
-    #[serde(default = "default_noise")]
-    pub noise: Vec<f64>,
     /// Predictions: `free`, the name of a template, or `partly-line`.
-    #[serde(default = "default_predictions")]
     pub predictions: Vec<String>,
-    /// Genomes of a generation.
-    pub population: Option<u32>,
-    /// Generations.
-    pub generations: Option<u32>,
-    /// Repetitions of an evaluation.
-    pub repetitions: Option<u32>,
-    /// Steps of a repetition.
-    pub steps: Option<u32>,
-    /// Probability that a weight mutates.
-    pub mutation: Option<f64>,
     /// Seed of the first run.
-    #[serde(default = "default_first_seed")]
     pub first_seed: u64,
     /// Whether it is left out unless it is asked for by name.
-    #[serde(default)]
     pub optional: bool,
+    /// Values of other settings, by their names.
+    values: BTreeMap<&'static str, Vec<String>>,
 }
 
 /// Best genomes of some experiments, from new starts.
@@ -121,29 +100,8 @@ pub struct Resilience {
     pub further_runs: u32,
 }
 
-fn default_grids() -> Vec<String> {
-    vec!["15x15".to_owned()]
-}
-
-fn default_robots() -> Vec<u32> {
-    vec![100]
-}
-
-fn default_models() -> Vec<String> {
-    vec!["c".to_owned()]
-}
-
-fn default_noise() -> Vec<f64> {
-    vec![0.0]
-}
-
-fn default_predictions() -> Vec<String> {
-    vec!["free".to_owned()]
-}
-
-fn default_first_seed() -> u64 {
-    1
-}
+/// Predictions that no template fixes.
+const FREE: &str = "free";
 
 /// Most areas of a resilience: they are called A to Z.
 const AREAS_MAX: usize = 26;
@@ -198,8 +156,8 @@ fn check_combinations(experiment: &Experiment, sum: &mut u64) -> Result<(), Stri
         return Ok(());
     }
     Err(format!(
-        "sensor-models, predictions, grids, robots and noise make {sum} combinations with those of \
-         the experiments before; expected at most {COMBINATIONS_MAX} in a suite"
+        "the listed values make {sum} combinations with those of the experiments before; expected at \
+         most {COMBINATIONS_MAX} in a suite"
     ))
 }
 
@@ -215,26 +173,34 @@ fn check_seeds(first_seed: u64, runs: u32) -> Result<(), String> {
 }
 
 impl Experiment {
+    /// The settings that it gives values of, the fastest varying first, with these values.
+    pub fn lists(&self) -> impl Iterator<Item = (&'static Setting, &[String])> {
+        let first = ["noise", "robots", "grid", "sensor-model"];
+        let others = self.values.keys().copied();
+        let others = others.filter(move |name| !first.contains(name));
+        let names = first.into_iter().chain(others);
+        names.filter_map(|name| Some((setting(name)?, self.values.get(name)?.as_slice())))
+    }
+
     /// Number of combinations of the listed values.
     fn combinations(&self) -> u64 {
-        [
-            self.sensor_models.len(),
-            self.predictions.len(),
-            self.grids.len(),
-            self.robots.len(),
-            self.noise.len(),
-        ]
-        .into_iter()
-        .fold(1, |product, values| product.saturating_mul(values as u64))
+        self.lists()
+            .map(|(_, values)| values.len())
+            .chain([self.predictions.len()])
+            .fold(1, |product, values| product.saturating_mul(values as u64))
+    }
+
+    fn smallest_swarm(&self) -> Option<u32> {
+        let robots = self.values.get("robots")?.iter();
+        robots.filter_map(|robots| robots.parse().ok()).min()
     }
 
     fn check(&self, combinations: &mut u64) -> Result<(), String> {
         check_name(&self.name)?;
         check_count("runs", self.runs)?;
-        check_list("grids", &self.grids)?;
-        check_list("robots", &self.robots)?;
-        check_list("sensor-models", &self.sensor_models)?;
-        check_list("noise", &self.noise)?;
+        for (setting, values) in self.lists() {
+            check_list(setting.list, values)?;
+        }
         check_list("predictions", &self.predictions)?;
         check_seeds(self.first_seed, self.runs)?;
         check_combinations(self, combinations)?;
@@ -320,10 +286,8 @@ impl Resilience {
         }
         let of = experiments.iter().filter(|e| e.name == self.of);
         // Some robot has to be left.
-        let most = of
-            .flat_map(|e| &e.robots)
-            .min()
-            .map_or(0, |robots| robots - 1);
+        let smallest = of.filter_map(Experiment::smallest_swarm).min();
+        let most = smallest.map_or(0, |robots| robots - 1);
         for &robots in &self.robots_in_areas {
             if !(1..=most).contains(&robots) {
                 return Err(format!(

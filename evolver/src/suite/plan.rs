@@ -8,17 +8,14 @@
 //! earlier settings have; runs are made one by one as they are asked for, so that a plan of a
 //! million runs, or a share of it, takes no more memory than one of ten.
 
-use super::{Experiment, Suite, check_combinations, check_seeds};
-use crate::settings::{Given, SettingError, Settings};
-use crate::text::hex;
-use minimal_surprise_controller::KERNEL_ID;
-use sha2::{Digest, Sha256};
+use super::{Experiment, FREE, Suite, check_combinations, check_seeds};
+use minimal_surprise_controller::Prediction;
+use minimal_surprise_evolution::run_id::run_id;
+use minimal_surprise_evolution::settings::{Overrides, SettingError, Settings, model_name};
+use minimal_surprise_evolution::text::hex;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-
-/// Version of what a run computes from its settings; changes with every change of results.
-const RESULTS_VERSION: &str = "1";
 
 /// The runs of a suite.
 #[derive(Clone, Debug)]
@@ -71,6 +68,8 @@ pub struct PlannedSettings {
 pub struct PlannedRun {
     /// Its name, and that of its directory.
     pub id: String,
+    /// What distinguishes its settings.
+    pub label: String,
     /// Its seed.
     pub seed: u64,
     /// Everything else.
@@ -109,7 +108,7 @@ impl PlannedExperiment {
     fn combination(&self, combination: u64) -> PlannedSettings {
         let settings = combination_of(&self.asked, combination).expect("settings were checked");
         PlannedSettings {
-            label: label(&settings),
+            label: label(&settings, &self.asked),
             settings,
             number: self.asked.runs,
             experiment: self.index,
@@ -134,12 +133,11 @@ impl PlannedSettings {
 
     /// A run, planned or beyond the plan; none if there is no such seed.
     fn run(&self, number: u64) -> Option<PlannedRun> {
-        let seed = self.settings.seed.checked_add(number)?;
-        let mut settings = self.settings.clone();
-        settings.seed = seed;
-        settings.written.seed = seed;
+        let seed = self.settings.seed().checked_add(number)?;
+        let settings = self.settings.clone().with_seed(seed);
         Some(PlannedRun {
-            id: hex(&id(&settings)),
+            id: hex(&run_id(&settings)),
+            label: self.label.clone(),
             seed,
             settings,
             experiment: self.experiment,
@@ -312,7 +310,9 @@ impl Plan {
     pub fn title(&self, run: &PlannedRun) -> String {
         let PlannedExperiment { name, asked, .. } = &self.experiments[run.experiment];
         let total = asked.combinations() * u64::from(asked.runs);
-        let (place, label, seed) = (run.place, label(&run.settings), run.seed);
+        let PlannedRun {
+            place, label, seed, ..
+        } = run;
         format!("{name} {place}/{total}: {label}, seed {seed}")
     }
 }
@@ -323,10 +323,9 @@ fn different(experiments: &[PlannedExperiment]) -> Result<Vec<SeedRange>, Settin
     let mut names = Vec::new();
     for experiment in experiments {
         for combination in 0..experiment.asked.combinations() {
-            let mut settings = combination_of(&experiment.asked, combination)?;
             // What the settings are without their seed.
-            settings.written.seed = 0;
-            names.push((id(&settings), ranges.len()));
+            let settings = combination_of(&experiment.asked, combination)?.with_seed(0);
+            names.push((run_id(&settings), ranges.len()));
             ranges.push(SeedRange {
                 experiment: experiment.index as u32,
                 combination: combination as u32,
@@ -377,33 +376,37 @@ fn without(seeds: Range<u64>, others: &[Range<u64>]) -> Vec<Range<u64>> {
     })
 }
 
-/// The name of a run.
-fn id(settings: &Settings) -> [u8; 8] {
-    let written = toml::to_string(&settings.written).expect("plain numbers and strings");
-    let text = format!("{KERNEL_ID}\n{RESULTS_VERSION}\n{written}");
-    let hash = Sha256::digest(text.as_bytes());
-    *hash.first_chunk().expect("a hash has 32 bytes")
-}
-
-/// What distinguishes settings, in words.
-#[must_use]
-pub fn label(settings: &Settings) -> String {
-    let written = &settings.written;
-    let mut label = format!("{}, {}", written.sensor_model.to_uppercase(), written.grid);
-    if let Some(template) = &written.predefine {
-        label += &format!(", {template} predefined");
+/// What distinguishes settings, in words: model, predictions, grid, swarm size and noise, and
+/// whatever else the experiment has several values of.
+fn label(settings: &Settings, experiment: &Experiment) -> String {
+    let (scenario, noise) = (settings.scenario(), settings.noise());
+    let model = model_name(settings.topology().model()).to_uppercase();
+    let mut label = format!("{model}, {}", scenario.grid());
+    match settings.topology().prediction() {
+        Prediction::Free => {}
+        Prediction::Predefined(template) => label += &format!(", {} predefined", template.name()),
+        Prediction::PartlyPredefined(template) => {
+            label += &format!(", {} partly predefined", template.name());
+        }
     }
-    if let Some(template) = &written.predefine_partly {
-        label += &format!(", {template} partly predefined");
+    if scenario.robots() != 100 {
+        label += &format!(", {} robots", scenario.robots());
     }
-    if written.robots != 100 {
-        label += &format!(", {} robots", written.robots);
+    if noise != 0.0 {
+        label += &format!(", {} % noise", 100.0 * noise);
     }
-    if written.noise != 0.0 {
-        label += &format!(", {} % noise", 100.0 * written.noise);
+    for (setting, values) in experiment.lists() {
+        if values.len() > 1 && !LABELLED.contains(&setting.name) {
+            let value = settings.value(setting.name);
+            let value = value.map_or_else(|| setting.default.to_owned(), |v| v.to_string());
+            label += &format!(", {} {value}", setting.name);
+        }
     }
     label
 }
+
+/// Settings that every label has.
+const LABELLED: [&str; 4] = ["grid", "robots", "sensor-model", "noise"];
 
 /// Every combination of an experiment's settings, with its first seed.
 pub fn settings_of(
@@ -412,7 +415,8 @@ pub fn settings_of(
     (0..experiment.combinations()).map(|combination| combination_of(experiment, combination))
 }
 
-/// The settings of one combination: noise varies fastest, then robots, grids, predictions, models.
+/// The settings of one combination: noise varies fastest, then robots, grids, predictions, models,
+/// then whatever else is listed.
 fn combination_of(experiment: &Experiment, combination: u64) -> Result<Settings, SettingError> {
     let mut rest = combination;
     let mut next = |values: usize| {
@@ -420,33 +424,19 @@ fn combination_of(experiment: &Experiment, combination: u64) -> Result<Settings,
         rest /= values as u64;
         index as usize
     };
-    let noise = experiment.noise[next(experiment.noise.len())];
-    let robots = experiment.robots[next(experiment.robots.len())];
-    let grid = &experiment.grids[next(experiment.grids.len())];
-    let prediction = &experiment.predictions[next(experiment.predictions.len())];
-    let model = &experiment.sensor_models[next(experiment.sensor_models.len())];
-    let mut given = Given::default();
-    given.flag("sensor-model", Some(model));
-    match prediction.strip_prefix("partly-") {
-        Some(template) => given.flag("predefine-partly", Some(template)),
-        None if prediction == "free" => {}
-        None => given.flag("predefine", Some(prediction)),
+    let mut overrides = Overrides::default();
+    for (setting, values) in experiment.lists() {
+        overrides.flag(setting.name, Some(&values[next(values.len())]));
+        if setting.name == "grid" {
+            let prediction = &experiment.predictions[next(experiment.predictions.len())];
+            match prediction.strip_prefix("partly-") {
+                Some(template) => overrides.flag("predefine-partly", Some(template)),
+                None if prediction == FREE => {}
+                None => overrides.flag("predefine", Some(prediction)),
+            }
+        }
     }
-    given.flag("grid", Some(grid));
-    given.flag("robots", Some(&robots.to_string()));
-    given.flag("noise", Some(&noise.to_string()));
-    let numbers = [
-        ("population", experiment.population),
-        ("generations", experiment.generations),
-        ("repetitions", experiment.repetitions),
-        ("steps", experiment.steps),
-    ];
-    for (key, number) in numbers {
-        given.flag(key, number.map(|n| n.to_string()).as_deref());
-    }
-    let mutation = experiment.mutation.map(|rate| rate.to_string());
-    given.flag("mutation", mutation.as_deref());
-    Settings::resolve(&given, || experiment.first_seed)
+    Settings::resolve(&overrides, || experiment.first_seed)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 
 use super::Resilience;
 use super::plan::{Plan, PlannedRun};
-use crate::damaged_runs::DamagedRuns;
+use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_sim::{Structure, classify};
 use std::path::Path;
 
@@ -72,16 +72,16 @@ fn has(
     damaged: &mut DamagedRuns,
 ) -> Option<bool> {
     let finished = damaged.read(&run.directory(suite))?;
-    let found = classify(run.settings.scenario.grid(), &finished.final_poses);
+    let found = classify(run.settings.scenario().grid(), &finished.final_poses);
     Some(found.is_ok_and(|found| found.names().contains(&structure)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::finished_run::FinishedRun;
     use crate::suite::work::{Worked, work_on};
     use crate::suite::{Suite, plan::PlannedRun};
+    use minimal_surprise_evolution::finished_run::FinishedRun;
     use std::collections::BTreeSet;
     use std::sync::atomic::AtomicBool;
 
@@ -119,7 +119,7 @@ mod tests {
 
     fn names(run: &PlannedRun, directory: &Path) -> Vec<Structure> {
         let finished = FinishedRun::read(&run.directory(directory)).unwrap();
-        let grid = run.settings.scenario.grid();
+        let grid = run.settings.scenario().grid();
         classify(grid, &finished.final_poses).unwrap().names()
     }
 

@@ -5,9 +5,9 @@
 //! submission. Tasks tell each other nothing; one that is requeued, or runs twice, finds what is
 //! done by its files.
 
-use crate::files::{self, FileError};
-use crate::new_dir::{NewDir, remove_abandoned};
-use crate::text::{shell_path, shell_word};
+use minimal_surprise_evolution::files::{self, FileError};
+use minimal_surprise_evolution::new_dir::{NewDir, remove_abandoned};
+use minimal_surprise_evolution::text::{shell_path, shell_word};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};

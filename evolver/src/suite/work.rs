@@ -5,12 +5,13 @@
 //! Any number of processes may work on the same plan; each takes runs that no other holds.
 
 use super::plan::{Plan, PlannedRun, Runs};
-use crate::evolving::until_finished;
-use crate::experiment::Experiment;
-use crate::files;
-use crate::finished_run::{Progress, ReadRunError, complete};
-use crate::lock::Holder;
-use crate::run_dir::{Found, RunDir, RunDirError};
+use crate::program::this_program;
+use minimal_surprise_evolution::evolving::until_finished;
+use minimal_surprise_evolution::experiment::Experiment;
+use minimal_surprise_evolution::files;
+use minimal_surprise_evolution::finished_run::{Progress, ReadRunError, complete};
+use minimal_surprise_evolution::lock::Holder;
+use minimal_surprise_evolution::run_dir::{Found, RunDir, RunDirError};
 use minimal_surprise_sim::{Engine, Path as CodePath};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -188,7 +189,7 @@ fn open(run: &PlannedRun, directory: &Path) -> Result<Option<(Experiment, RunDir
     match found(directory) {
         Err(RunDirError::NotARun { .. } | RunDirError::NotThere(_)) => {
             let experiment = Experiment::new(run.settings.clone());
-            match RunDir::create(directory, &experiment) {
+            match RunDir::create(directory, &experiment, &this_program()) {
                 Ok(held) => Ok(Some((experiment, held.with_table_last()))),
                 // Another process has just made it.
                 Err(RunDirError::Exists(_)) => found(directory),

@@ -9,6 +9,18 @@ mod dispersion;
 mod field;
 mod lines;
 mod pairs;
+
+/// Names in words: `lines`, `lines and pairs (tied)`, `nothing`.
+#[must_use]
+pub fn in_words(names: &[Structure]) -> String {
+    let words: Vec<&str> = names.iter().map(|structure| structure.name()).collect();
+    match words.as_slice() {
+        [] => "nothing".to_owned(),
+        [one] => (*one).to_owned(),
+        several => format!("{} (tied)", several.join(" and ")),
+    }
+}
+
 #[cfg(test)]
 mod tests;
 

@@ -159,7 +159,7 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
         for of in &STATES_OF_PAPER {
             let group = gathered.group(of.experiment, of.label);
             if let Some(group) = group.filter(|group| !group.runs.is_empty()) {
-                let grid = &group.settings.written.grid;
+                let grid = group.settings.scenario().grid();
                 figures.push(final_states(
                     Name {
                         id: format!("figure-{}-{grid}", of.figure),
@@ -308,8 +308,8 @@ fn final_states(
     let states: Vec<State<'_>> = shown
         .into_iter()
         .map(|(mark, (name, structure, run))| State {
-            title: format!("{name}{mark} (seed {})", run.finished.settings.seed),
-            grid: group.settings.scenario.grid(),
+            title: format!("{name}{mark} (seed {})", run.finished.settings.seed()),
+            grid: group.settings.scenario().grid(),
             poses: &run.finished.final_poses,
             structure,
             area: None,
@@ -327,7 +327,7 @@ fn damage(prefix: &str, resilient: &Resilient) -> Result<Option<Figure>, FigureE
     if damaged.areas.is_empty() {
         return Ok(None);
     }
-    let grid = damaged.run.finished.settings.scenario.grid();
+    let grid = damaged.run.finished.settings.scenario().grid();
     let mut states = Vec::new();
     for after in [false, true] {
         for area in &damaged.areas {
@@ -462,7 +462,7 @@ fn predictions(name: Name, groups: &[&Group], gathered: &Gathered) -> Result<Fig
     let shown: Vec<(bool, String, &Group, &Run)> = groups
         .iter()
         .flat_map(|group| {
-            let grid = &group.settings.written.grid;
+            let grid = group.settings.scenario().grid();
             let planned = one_of_each(group, By::Structure).into_iter();
             let further = beyond_plan(gathered, group).into_iter();
             planned
@@ -492,7 +492,7 @@ fn predictions(name: Name, groups: &[&Group], gathered: &Gathered) -> Result<Fig
                 )?;
                 let robot = triangle((middle_x, middle_y), Heading::North, SIDE / 3);
                 put(area, Polygon::new(robot, OTHER.filled()))?;
-                let cells = group.settings.topology.model().cells();
+                let cells = group.settings.topology().model().cells();
                 for (sensor, (cell, &average)) in cells
                     .iter()
                     .zip(&run.finished.average_prediction)

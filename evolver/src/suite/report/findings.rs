@@ -5,7 +5,7 @@ use super::paper::{PaperValues, is_grouping};
 use super::plural;
 use super::statistics::{RUNS_MIN, Test, fisher, mann_whitney, median_interval, sign};
 use super::tables::MEDIAN_BEST_FITNESS;
-use crate::reevaluation::{mean, median};
+use minimal_surprise_evolution::reevaluation::{mean, median};
 use minimal_surprise_sim::structures::{LineOrientation, Structure};
 use serde::{Serialize, Serializer};
 use std::collections::BTreeSet;
@@ -179,7 +179,7 @@ fn others(group: &Group, is: impl Fn(&Run) -> bool) -> Detail {
             .iter()
             .map(|(structure, share)| format!("{structure} {:.0} %, ", 100.0 * share));
         Contradiction {
-            seed: run.finished.settings.seed,
+            seed: run.finished.settings.seed(),
             run: run.id.clone(),
             formed: format!("{}fitness {:.3}", shares.collect::<String>(), run.fitness()),
         }
@@ -333,7 +333,7 @@ fn predefined(gathered: &Gathered) -> Vec<Finding> {
         Finding {
             claim: format!(
                 "Predefined lines give lines in every run on {}",
-                group.settings.written.grid
+                group.settings.scenario().grid()
             ),
             detail: others(group, is),
             ours: format!("lines in {}", of_runs(lines, group)),

@@ -2,15 +2,17 @@
 
 use super::damage_areas::{Rectangle, smallest_apart};
 use super::{ReportError, plural};
-use crate::damaged_runs::DamagedRuns;
-use crate::finished_run::FinishedRun;
-use crate::reevaluation::{ResilienceRow, after_damage, mean, rerun, resilience};
-use crate::settings::Settings;
-use crate::suite::plan::{Plan, PlannedExperiment, PlannedRun, PlannedSettings, RUNS, label};
+use crate::suite::plan::{Plan, PlannedExperiment, PlannedRun, PlannedSettings, RUNS};
 use crate::suite::search::{Search, look};
 use crate::suite::{Reevaluation, Resilience, Suite};
-use crate::text::hex;
 use minimal_surprise_controller::Controller;
+use minimal_surprise_evolution::damaged_runs::DamagedRuns;
+use minimal_surprise_evolution::finished_run::FinishedRun;
+use minimal_surprise_evolution::reevaluation::{
+    ResilienceRow, after_damage, mean, rerun, resilience,
+};
+use minimal_surprise_evolution::settings::Settings;
+use minimal_surprise_evolution::text::hex;
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::structures::{LineCounts, LineOrientation, Structure, classify};
 use minimal_surprise_sim::{Area, Damage, Pose, SeedTree};
@@ -390,7 +392,7 @@ fn read_further(
         let Some(run) = read_run(&planned, &planned.directory(directory), damaged)? else {
             continue;
         };
-        let label = label(&planned.settings);
+        let label = planned.label.clone();
         match groups.iter_mut().find(|group| group.label == label) {
             Some(group) => {
                 group.planned += 1;
@@ -418,7 +420,7 @@ fn read_run(
     let Some(finished) = damaged.read(directory) else {
         return Ok(None);
     };
-    let found = classify(finished.settings.scenario.grid(), &finished.final_poses)?;
+    let found = classify(finished.settings.scenario().grid(), &finished.final_poses)?;
     Ok(Some(Run {
         id: planned.id.clone(),
         names: found.names(),
@@ -433,10 +435,10 @@ fn reevaluate(asked: &Reevaluation, group: &Group) -> Result<Reevaluated, Report
     let mut hash = Sha256::new();
     for run in &group.runs {
         let settings = &run.finished.settings;
-        let seeds = SeedTree::new(settings.seed);
+        let seeds = SeedTree::new(settings.seed());
         let reruns = rerun(
             &run.finished.genome,
-            &settings.scenario,
+            settings.scenario(),
             seeds,
             asked.starts,
         )?;
@@ -512,7 +514,7 @@ fn damage(
         .collect();
     // The first of the best: by share, then by seed, then in the plan's order.
     let chosen = named.iter().copied().reduce(|best, next| {
-        let key = |run: &Run| (run.share(structure), run.finished.settings.seed);
+        let key = |run: &Run| (run.share(structure), run.finished.settings.seed());
         let ((best_share, best_seed), (share, seed)) = (key(best.1), key(next.1));
         if share > best_share || (share == best_share && seed < best_seed) {
             next
@@ -525,8 +527,7 @@ fn damage(
         None => match look(plan, asked, directory, 0, damaged_runs) {
             Search::Found(found, further) => {
                 let run = read_run(&found, &found.directory(directory), damaged_runs)?;
-                let label = label(&found.settings);
-                let damaged = run.map(|run| damage_run(asked, structure, &label, &run));
+                let damaged = run.map(|run| damage_run(asked, structure, &found.label, &run));
                 (damaged.transpose()?, further)
             }
             Search::Next(_, next) => (None, next - 1),
@@ -554,7 +555,7 @@ fn overall<'a>(
     let mut hash = Sha256::new();
     for run in runs {
         let finished = &run.finished;
-        let grid = finished.settings.scenario.grid();
+        let grid = finished.settings.scenario().grid();
         let found = smallest_apart(grid, &finished.final_poses, &asked.robots_in_areas);
         for Rectangle { x0, y0, x1, y1 } in found.into_iter().flatten() {
             let area = Area::new(grid, x0, y0, x1, y1)?;
@@ -587,9 +588,9 @@ fn damage_run(
     of: &Run,
 ) -> Result<Damaged, ReportError> {
     let finished = &of.finished;
-    let conditions = &finished.settings.scenario;
+    let conditions = finished.settings.scenario();
     let grid = conditions.grid();
-    let seeds = SeedTree::new(finished.settings.seed);
+    let seeds = SeedTree::new(finished.settings.seed());
     let rows = |damage, repeat| resilience(finished, structure, damage, repeat);
     let mut initial = None;
     let mut areas = Vec::new();

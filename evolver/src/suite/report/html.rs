@@ -4,7 +4,7 @@ use super::findings::Verdict;
 use super::markdown::{interval, ours, sentence, theirs, verdict};
 use super::tables::{Table, Value};
 use super::{Report, p_value, plural};
-use crate::text::{html as escape, markdown, markdown_code};
+use minimal_surprise_evolution::text::{html as escape, markdown, markdown_code};
 use pulldown_cmark::{Event, Parser, html::push_html};
 use std::fmt::Write;
 

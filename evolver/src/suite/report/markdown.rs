@@ -2,7 +2,7 @@
 
 use super::tables::{Table, Value};
 use super::{Report, number, p_value};
-use crate::text::{markdown, markdown_code_cell};
+use minimal_surprise_evolution::text::{markdown, markdown_code_cell};
 use std::fmt::Write;
 
 /// The whole report.

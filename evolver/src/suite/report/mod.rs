@@ -16,14 +16,14 @@ pub mod statistics;
 pub mod tables;
 
 use super::Suite;
-use crate::files::{self, FileError, TEXT_BYTES_MAX};
-use crate::replay::gallery;
 use crate::report::progress::seconds;
-use crate::text::{hex, markdown, new_file_name, shell_word};
-use crate::time_spent::TimeSpent;
 use figures::{Figure, FigureError};
 use findings::{Finding, Verdict};
 use gather::{Gathered, Group, Run};
+use minimal_surprise_evolution::files::{self, FileError, TEXT_BYTES_MAX};
+use minimal_surprise_evolution::text::{hex, markdown, new_file_name, shell_word};
+use minimal_surprise_evolution::time_spent::TimeSpent;
+use minimal_surprise_replay::gallery;
 use minimal_surprise_sim::{DamageError, Structure, WorldError};
 use paper::PaperValues;
 use serde::Serialize;
@@ -429,7 +429,7 @@ fn making(group: &Group, called: &str) -> Making {
 
 /// First and last seed, in words.
 fn seeds(runs: &[Run]) -> String {
-    let mut seeds = runs.iter().map(|run| run.finished.settings.seed);
+    let mut seeds = runs.iter().map(|run| run.finished.settings.seed());
     match (seeds.next(), seeds.next_back()) {
         (Some(first), Some(last)) => format!("{first} to {last}"),
         (Some(only), None) => only.to_string(),
@@ -486,7 +486,7 @@ fn made_again(gathered: &Gathered, called: &str) -> Vec<Making> {
                     "{}: {}, from new starts and after damage",
                     resilient.asked.of, damaged.label
                 ),
-                damaged.run.finished.settings.seed.to_string(),
+                damaged.run.finished.settings.seed().to_string(),
                 (runs, runs),
                 &damaged.hash(),
             ));
@@ -523,7 +523,7 @@ fn run_rows(gathered: &Gathered) -> Vec<RunRow<'_>> {
                 experiment: &group.experiment,
                 setting: group.setting(),
                 id: &run.id,
-                seed: run.finished.settings.seed,
+                seed: run.finished.settings.seed(),
                 structures: names.join(";"),
                 share: run.named_share(),
                 fitness: run.fitness(),
@@ -555,10 +555,10 @@ fn csv_text(rows: &[impl Serialize]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::finished_run::FinishedRun;
-    use crate::reevaluation::median;
     use crate::suite::plan::Plan;
     use crate::suite::work::{Worked, work_on};
+    use minimal_surprise_evolution::finished_run::FinishedRun;
+    use minimal_surprise_evolution::reevaluation::median;
     use std::collections::BTreeMap;
     use std::sync::atomic::AtomicBool;
 
@@ -796,7 +796,7 @@ mod tests {
             assert_eq!(numbers[&(setting.clone(), what)], median(&fitness));
             let mut of_runs: BTreeMap<&str, f64> = BTreeMap::new();
             for run in &finished {
-                let grid = run.settings.scenario.grid();
+                let grid = run.settings.scenario().grid();
                 let names = minimal_surprise_sim::classify(grid, &run.final_poses)
                     .unwrap()
                     .names();

@@ -2,7 +2,7 @@
 //!
 //! Everything random has a fixed seed, so that the same runs give the same report.
 
-use crate::reevaluation::median;
+use minimal_surprise_evolution::reevaluation::median;
 use minimal_surprise_sim::seed::uniform_below;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;

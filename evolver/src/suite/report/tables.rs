@@ -10,8 +10,8 @@ use super::plural;
 use super::statistics::{
     Interval, RUNS_MIN, SIGN_TEST, Test, fisher, median_interval, median_is, wilson,
 };
-use crate::reevaluation::{mean, median};
 use minimal_surprise_controller::{Prediction, Template};
+use minimal_surprise_evolution::reevaluation::{mean, median};
 use minimal_surprise_sim::structures::{LineOrientation, Structure};
 use serde::Serialize;
 
@@ -693,7 +693,7 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
 
 /// Sensors that the prediction network of a run predicts, on average, more often occupied than not.
 fn sensors_predicted_often(run: &Run) -> usize {
-    let predicted = run.finished.settings.topology.predicted();
+    let predicted = run.finished.settings.topology().predicted();
     let averages = run.finished.average_prediction.iter().enumerate();
     averages
         .filter(|&(sensor, &average)| predicted.get(sensor) && average > 0.5)
@@ -703,7 +703,7 @@ fn sensors_predicted_often(run: &Run) -> usize {
 /// Table 6: which way the lines go, in the runs and from new starts.
 fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
     let is_line = |group: &&Group| {
-        group.settings.topology.prediction() == Prediction::Predefined(Template::Line)
+        group.settings.topology().prediction() == Prediction::Predefined(Template::Line)
     };
     let mut shared = Vec::new();
     for group in gathered.groups.iter().filter(is_line) {
@@ -868,10 +868,11 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
                  {further} beyond the plan, was damaged"
             ),
         };
-        let grid = damaged.run.finished.settings.scenario.grid();
+        let grid = damaged.run.finished.settings.scenario().grid();
         notes.push(format!(
             "{chosen}: {}, seed {}. Means, medians in brackets with their bootstrap 95 % interval.",
-            damaged.label, damaged.run.finished.settings.seed
+            damaged.label,
+            damaged.run.finished.settings.seed()
         ));
         if !of_paper.is_empty() {
             let grids = if grid.to_string() == DAMAGED_GRID {

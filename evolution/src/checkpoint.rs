@@ -1,0 +1,215 @@
+//! Checkpoints: an evolution between two generations, in one file.
+//!
+//! postcard, then its CRC-32C in four bytes, little-endian. It holds the text of the run's
+//! `config.toml`, so that a run is never continued under other settings.
+
+use crate::experiment::{Experiment, GenerationRecord};
+use crate::population::Population;
+use crate::run_hash::RunHash;
+use crate::settings::Settings;
+use minimal_surprise_controller::codec::CRC_32C;
+use minimal_surprise_controller::{Genome, KERNEL_ID, KernelId, Topology};
+use serde::{Deserialize, Serialize};
+
+/// Version of the file's layout.
+const SCHEMA: u32 = 1;
+
+/// The bytes are not a checkpoint that can be continued from.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    /// The file was cut or changed.
+    #[error("the checkpoint is damaged: {0}")]
+    Damaged(&'static str),
+    /// Written by a program with another layout.
+    #[error("the checkpoint has schema version {found}; this program reads version {SCHEMA}")]
+    OtherSchema {
+        /// The version found.
+        found: u32,
+    },
+    /// Written by a program with another arithmetic.
+    #[error("the checkpoint belongs to kernel {found}; this program is kernel {KERNEL_ID}")]
+    OtherKernel {
+        /// The kernel found.
+        found: KernelId,
+    },
+    /// The run's settings were edited.
+    #[error("config.toml is not what the run was started with")]
+    OtherSettings,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    schema: u32,
+    kernel: KernelId,
+    settings: String,
+    generation: u32,
+    genomes: Vec<Vec<i16>>,
+    history: Vec<GenerationRecord>,
+    hash: RunHash,
+    best: Option<Vec<i16>>,
+}
+
+/// The bytes of a checkpoint.
+#[must_use]
+pub fn encode(experiment: &Experiment, settings_text: &str) -> Vec<u8> {
+    let population = experiment.population();
+    let weights = |genome: &Genome| genome.weights().to_vec();
+    let stored = Stored {
+        schema: SCHEMA,
+        kernel: KERNEL_ID,
+        settings: settings_text.to_owned(),
+        generation: population.generation(),
+        genomes: population.ask().iter().map(weights).collect(),
+        history: experiment.history().to_vec(),
+        hash: experiment.hash(),
+        best: experiment.best().map(weights),
+    };
+    sealed(&stored)
+}
+
+fn sealed(stored: &Stored) -> Vec<u8> {
+    let mut bytes = postcard::to_allocvec(stored).expect("memory is the only limit");
+    let crc = CRC_32C.checksum(&bytes);
+    bytes.extend(crc.to_le_bytes());
+    bytes
+}
+
+/// The experiment in a checkpoint.
+///
+/// # Errors
+/// [`CheckpointError`] if it is damaged or belongs to another program or other settings.
+pub fn decode(
+    bytes: &[u8],
+    settings: Settings,
+    settings_text: &str,
+) -> Result<Experiment, CheckpointError> {
+    use CheckpointError::Damaged;
+    let (body, crc) = bytes.split_last_chunk().ok_or(Damaged("too short"))?;
+    if CRC_32C.checksum(body) != u32::from_le_bytes(*crc) {
+        return Err(Damaged("its checksum does not match"));
+    }
+    // The version comes first, so that it can be read whatever follows.
+    let (found, _) = postcard::take_from_bytes(body).map_err(|_| Damaged("no version"))?;
+    if found != SCHEMA {
+        return Err(CheckpointError::OtherSchema { found });
+    }
+    let stored: Stored = postcard::from_bytes(body).map_err(|_| Damaged("malformed"))?;
+    if stored.kernel != KERNEL_ID {
+        return Err(CheckpointError::OtherKernel {
+            found: stored.kernel,
+        });
+    }
+    if stored.settings != settings_text {
+        return Err(CheckpointError::OtherSettings);
+    }
+    let genome = |weights: &Vec<i16>| genome(settings.topology(), weights);
+    let genomes: Vec<Genome> = stored
+        .genomes
+        .iter()
+        .map(genome)
+        .collect::<Result<_, _>>()?;
+    let best = stored.best.as_ref().map(genome).transpose()?;
+    if genomes.len() as u64 != u64::from(settings.population()) {
+        return Err(Damaged("the population has another size"));
+    }
+    check(&stored, &settings).map_err(Damaged)?;
+    let population = Population::restored(stored.generation, genomes);
+    Ok(Experiment::restored(
+        settings,
+        population,
+        stored.history,
+        stored.hash,
+        best,
+    ))
+}
+
+/// Whether the numbers are such as an evolution under these settings has.
+fn check(stored: &Stored, settings: &Settings) -> Result<(), &'static str> {
+    let (done, all) = (
+        stored.history.len() as u64,
+        u64::from(settings.generations()),
+    );
+    if done > all || stored.best.is_some() != (done > 0) {
+        return Err("it has another number of generations than config.toml");
+    }
+    // The last generation is not followed by another population.
+    if u64::from(stored.generation) != done.min(all - 1) {
+        return Err("its population is of another generation");
+    }
+    let bits = settings.scored_bits();
+    let is_possible = |(expected, record): (u32, &GenerationRecord)| {
+        record.generation == expected
+            && record.best_slot < settings.population()
+            && record.worst_repetition < settings.repetitions()
+            && record.worst_matches <= record.best_matches
+            && record.best_matches <= bits
+            && record.total_matches <= bits.saturating_mul(settings.population().into())
+    };
+    if !(0..).zip(&stored.history).all(is_possible) {
+        return Err("a generation has numbers that cannot be");
+    }
+    Ok(())
+}
+
+fn genome(topology: Topology, weights: &[i16]) -> Result<Genome, CheckpointError> {
+    Genome::from_weights(topology, weights)
+        .map_err(|_| CheckpointError::Damaged("a genome does not fit the topology"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Overrides;
+    use minimal_surprise_sim::{Engine, Path};
+    use std::sync::atomic::AtomicBool;
+
+    fn settings() -> Settings {
+        let mut given = Overrides::default();
+        for (key, value) in [
+            ("grid", "8x8"),
+            ("robots", "20"),
+            ("population", "4"),
+            ("generations", "3"),
+            ("repetitions", "2"),
+            ("steps", "20"),
+        ] {
+            given.flag(key, Some(value));
+        }
+        Settings::resolve(&given, || 1).unwrap()
+    }
+
+    /// What becomes of a checkpoint after two of three generations, changed with a correct checksum.
+    fn decoded(change: impl FnOnce(&mut Stored)) -> Result<Experiment, CheckpointError> {
+        let mut experiment = Experiment::new(settings());
+        for _ in 0..2 {
+            let _ = experiment.advance(Engine::Plain, Path::Portable, &AtomicBool::new(false));
+        }
+        let bytes = encode(&experiment, "text");
+        let mut stored = postcard::from_bytes(&bytes).unwrap();
+        change(&mut stored);
+        decode(&sealed(&stored), settings(), "text")
+    }
+
+    #[test]
+    fn a_checkpoint_with_numbers_that_cannot_be_is_damaged() {
+        assert_eq!(decoded(|_| {}).unwrap().history().len(), 2);
+        let changes: [fn(&mut Stored); 12] = [
+            |stored| stored.generation = 1,
+            |stored| stored.generation = u32::MAX,
+            |stored| stored.best = None,
+            |stored| stored.history.clear(),
+            |stored| stored.history.extend_from_within(..),
+            |stored| stored.history[1].generation = 0,
+            |stored| stored.history[1].best_slot = 4,
+            |stored| stored.history[1].worst_repetition = 2,
+            |stored| stored.history[1].best_matches = u64::MAX,
+            |stored| stored.history[0].total_matches = u64::MAX,
+            |stored| stored.history[0].movement = f64::NAN,
+            |stored| stored.history[0].share = -1.0,
+        ];
+        for (place, change) in changes.into_iter().enumerate() {
+            let error = decoded(change).expect_err("it is damaged");
+            assert!(matches!(error, CheckpointError::Damaged(_)), "{place}");
+        }
+    }
+}

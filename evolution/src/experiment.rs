@@ -1,0 +1,261 @@
+//! An experiment: evolution and world together, a generation at a time.
+
+use crate::generation_work::Work;
+use crate::population::{Population, best_slot};
+use crate::ranges;
+use crate::run_hash::RunHash;
+use crate::settings::Settings;
+use crate::steps_hash::{StepsHash, Version};
+use minimal_surprise_controller::{Controller, Genome, Provenance};
+use minimal_surprise_sim::evaluation::{Outcome, run};
+use minimal_surprise_sim::metrics::Measures;
+use minimal_surprise_sim::structures::{Structures, classify};
+use minimal_surprise_sim::{Engine, Evaluator, Path, Pose, SeedTree, Trial, WorldError};
+use serde::{Deserialize, Serialize};
+use std::sync::atomic::AtomicBool;
+
+/// What a generation came to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GenerationRecord {
+    /// Number of the generation, from 0.
+    pub generation: u32,
+    /// Matches of the best genome.
+    pub best_matches: u64,
+    /// Sum of the matches of all genomes.
+    pub total_matches: u64,
+    /// Matches of the worst genome.
+    pub worst_matches: u64,
+    /// Slot of the best genome.
+    pub best_slot: u32,
+    /// The repetition that gave the best genome its fitness, its worst one.
+    pub worst_repetition: u32,
+    /// Robot movement M in that repetition (paper, Eq. 4).
+    #[serde(deserialize_with = "ranges::fraction")]
+    pub movement: f64,
+    /// Intended robot movement I in that repetition (paper, Eq. 5).
+    #[serde(deserialize_with = "ranges::fraction")]
+    pub intended_movement: f64,
+    /// Structures that the repetition's final state is named after, `;` between them.
+    pub structure: String,
+    /// Share of robots in that structure, 0 to 1.
+    #[serde(deserialize_with = "ranges::fraction")]
+    pub share: f64,
+}
+
+/// An evolution in progress.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    settings: Settings,
+    /// The generation to evaluate next; after the last one, the last one.
+    population: Population,
+    history: Vec<GenerationRecord>,
+    hash: RunHash,
+    best: Option<Genome>,
+}
+
+/// What an evolution results in: the last generation's best genome, run once more from where it
+/// had its fitness.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// The genome.
+    pub genome: Genome,
+    /// Where it comes from.
+    pub provenance: Provenance,
+    /// The repetition that it was run from.
+    pub repetition: u32,
+    /// Starting poses.
+    pub starts: Vec<Pose>,
+    /// What the run came to.
+    pub outcome: Outcome,
+    /// How it went.
+    pub measures: Measures,
+    /// The hash of its steps.
+    pub steps_hash: StepsHash,
+    /// What the swarm formed.
+    pub structures: Structures,
+    /// The run's hash.
+    pub hash: RunHash,
+}
+
+impl Finding {
+    /// Share of robots in the structure that the run is named after, 0 to 1.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        share_of_named(&self.structures)
+    }
+}
+
+/// Share of robots in the structure that a state is named after; 0 if there is none.
+fn share_of_named(found: &Structures) -> f64 {
+    let names = found.names();
+    names.first().map_or(0.0, |&name| found.share(name))
+}
+
+impl Experiment {
+    /// An evolution before its first generation.
+    #[must_use]
+    pub fn new(settings: Settings) -> Self {
+        let seeds = SeedTree::new(settings.seed());
+        let size = settings.population();
+        let population = match settings.ancestor() {
+            None => Population::random(settings.topology(), size, seeds),
+            Some(ancestor) => {
+                Population::mutants_of(ancestor, size, settings.variation().mutation, seeds)
+            }
+        };
+        Self {
+            settings,
+            population,
+            history: Vec::new(),
+            hash: RunHash::default(),
+            best: None,
+        }
+    }
+
+    /// An evolution stored earlier.
+    #[must_use]
+    pub fn restored(
+        settings: Settings,
+        population: Population,
+        history: Vec<GenerationRecord>,
+        hash: RunHash,
+        best: Option<Genome>,
+    ) -> Self {
+        Self {
+            settings,
+            population,
+            history,
+            hash,
+            best,
+        }
+    }
+
+    /// Evaluates a generation, in parallel, and moves on to the next. Results do not depend on the
+    /// number of threads, the engine or its path.
+    ///
+    /// Nothing comes back, and nothing has changed, if `stop` was set on the way.
+    pub fn advance(
+        &mut self,
+        engine: Engine,
+        path: Path,
+        stop: &AtomicBool,
+    ) -> Option<GenerationRecord> {
+        let seeds = SeedTree::new(self.settings.seed());
+        let generation = self.history.len() as u32;
+        let scenario = self.settings.scenario();
+        let trials: Vec<Trial> = (0..self.settings.repetitions())
+            .map(|repetition| scenario.trial(seeds, generation, repetition))
+            .collect();
+        let work = Work::new(
+            scenario,
+            self.settings.topology(),
+            trials,
+            self.population.ask(),
+        );
+        let evaluations = work.evaluate(engine, path, stop)?;
+        let matches: Vec<u64> = evaluations.iter().map(|e| e.matches).collect();
+        let best = best_slot(&matches);
+        let worst_repetition = evaluations[best].worst_repetition;
+        let (motion, poses) = Evaluator::new(engine, path).motion(
+            &self.population.ask()[best],
+            work.trials(),
+            worst_repetition,
+        );
+        let found = classify(scenario.grid(), &poses).expect("a world keeps its robots apart");
+        let names = found.names();
+        let record = GenerationRecord {
+            generation,
+            best_matches: matches[best],
+            total_matches: matches.iter().sum(),
+            worst_matches: matches.iter().copied().min().unwrap_or(0),
+            best_slot: best as u32,
+            worst_repetition,
+            movement: motion.movement(),
+            intended_movement: motion.intended_movement(),
+            structure: names.iter().map(|n| n.name()).collect::<Vec<_>>().join(";"),
+            share: share_of_named(&found),
+        };
+        self.hash = self.hash.generation(&matches);
+        self.history.push(record.clone());
+        self.best = Some(self.population.ask()[best].clone());
+        if !self.is_finished() {
+            self.population = self
+                .population
+                .tell(&matches, self.settings.variation(), seeds);
+        }
+        Some(record)
+    }
+
+    /// Whether every generation has been evaluated.
+    #[must_use]
+    pub fn is_finished(&self) -> bool {
+        self.history.len() as u64 >= u64::from(self.settings.generations())
+    }
+
+    /// The result so far: of the last generation evaluated; none before the first.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the trial does not fit its own grid.
+    pub fn finding(&self) -> Result<Option<Finding>, WorldError> {
+        let (Some(record), Some(genome)) = (self.history.last(), &self.best) else {
+            return Ok(None);
+        };
+        let seeds = SeedTree::new(self.settings.seed());
+        let scenario = self.settings.scenario();
+        let trial = scenario.trial(seeds, record.generation, record.worst_repetition);
+        let mut measures =
+            Measures::starting_from(scenario.grid(), self.settings.topology(), &trial.starts);
+        let mut steps_hash =
+            StepsHash::new(Version::default(), &trial, self.settings.topology().model());
+        let outcome = run(&Controller::new(genome), scenario, &trial, |world| {
+            measures.observe(world);
+            steps_hash.observe(world);
+        })?;
+        Ok(Some(Finding {
+            genome: genome.clone(),
+            provenance: Provenance {
+                seed: Some(self.settings.seed()),
+                generation: record.generation,
+                matched_bits: record.best_matches,
+                scored_bits: self.settings.scored_bits(),
+            },
+            repetition: record.worst_repetition,
+            starts: trial.starts,
+            hash: self.hash.end(genome, &outcome.final_poses),
+            structures: classify(scenario.grid(), &outcome.final_poses)?,
+            measures,
+            steps_hash,
+            outcome,
+        }))
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The generation to evaluate next.
+    #[must_use]
+    pub fn population(&self) -> &Population {
+        &self.population
+    }
+
+    /// The generations evaluated, in order.
+    #[must_use]
+    pub fn history(&self) -> &[GenerationRecord] {
+        &self.history
+    }
+
+    /// The hash of the generations evaluated.
+    #[must_use]
+    pub fn hash(&self) -> RunHash {
+        self.hash
+    }
+
+    /// Best genome of the last generation evaluated.
+    #[must_use]
+    pub fn best(&self) -> Option<&Genome> {
+        self.best.as_ref()
+    }
+}

@@ -1,0 +1,581 @@
+//! Reading a complete run directory back: the genome, where it started from, where it ended.
+
+use crate::files::{self, FileError, TEXT_BYTES_MAX};
+use crate::limits;
+use crate::ranges;
+use crate::run_files::{
+    BEST, CONFIG, DONE, FINAL, FinalFile, GENERATIONS, GenerationRow, META, Meta, OF_COMPLETE,
+    SCHEMA_VERSION,
+};
+use crate::settings::{Overrides, SettingError, Settings};
+use crate::steps_hash::{RecordedHash, StepsHash, Version};
+use crate::time_spent::TimeSpent;
+use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
+use minimal_surprise_controller::{Controller, DecodeError, EncodedGenome, Genome, Provenance};
+use minimal_surprise_sim::evaluation::run;
+use minimal_surprise_sim::metrics::Measures;
+use minimal_surprise_sim::world::check_poses;
+use minimal_surprise_sim::{Grid, Pose, SeedTree, Trace, Trial, World, WorldError};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// A run that is complete.
+#[derive(Clone, Debug)]
+pub struct FinishedRun {
+    /// Its settings.
+    pub settings: Settings,
+    /// Its result: the last generation's best genome.
+    pub genome: Genome,
+    /// Where the genome comes from.
+    pub provenance: Provenance,
+    /// The repetition that gave the genome its fitness.
+    pub repetition: u32,
+    /// Where the swarm started from in that repetition.
+    pub starts: Vec<Pose>,
+    /// Where it ended.
+    pub final_poses: Vec<Pose>,
+    /// The run's hash.
+    pub hash: String,
+    /// The hash of its steps; a run of an older program has none.
+    pub steps_hash: Option<RecordedHash>,
+    /// Best fitness of every generation.
+    pub best_fitness: Vec<f64>,
+    /// Movement M of the final run.
+    pub movement: f64,
+    /// Intended movement I.
+    pub intended_movement: f64,
+    /// Temperature of every step.
+    pub temperature: Vec<f64>,
+    /// Average prediction of every sensor.
+    pub average_prediction: Vec<f64>,
+    /// Program, version and revision that did it.
+    pub program: String,
+    /// How long it took.
+    pub time: TimeSpent,
+}
+
+/// A run directory cannot be read back.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadRunError {
+    /// The run has not ended, or there is none.
+    #[error("{} holds no complete run: it has no {missing}", path.display())]
+    NotComplete {
+        /// The directory.
+        path: PathBuf,
+        /// The file that is missing.
+        missing: &'static str,
+    },
+    /// The run is marked complete, and is not.
+    #[error(
+        "{error}\nthe run is marked complete, so it was damaged, or made by another version: \
+         delete {}, and the command that made it does it again",
+        path.display()
+    )]
+    Damaged {
+        /// The directory.
+        path: PathBuf,
+        /// What is wrong.
+        error: Box<ReadRunError>,
+    },
+    /// A file cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The settings are wrong.
+    #[error(transparent)]
+    Settings(#[from] SettingError),
+    /// The genome is not one this program runs.
+    #[error("{}: {error}", path.display())]
+    Genome {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: DecodeError,
+    },
+    /// A final state is not one.
+    #[error(transparent)]
+    State(#[from] StateError),
+    /// A file is not the JSON that it should be.
+    #[error("{}: {error}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with line and column.
+        error: serde_json::Error,
+    },
+    /// The table of the generations is not one.
+    #[error("{}: {error}", path.display())]
+    Generations {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where.
+        error: csv::Error,
+    },
+    /// A value in a file cannot be.
+    #[error("{}: {problem}", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The value, and what would be valid.
+        problem: String,
+    },
+    /// The directory's files do not belong together.
+    #[error("{}: {problem}", path.display())]
+    Inconsistent {
+        /// The directory.
+        path: PathBuf,
+        /// What does not fit.
+        problem: &'static str,
+    },
+}
+
+/// A file holds no final state.
+#[derive(Debug, thiserror::Error)]
+pub enum StateError {
+    /// It is not the JSON that it should be.
+    #[error("{}: {error}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with line and column.
+        error: serde_json::Error,
+    },
+    /// It has another layout.
+    #[error("{}: schema version {found}; this program reads version {}", path.display(), SCHEMA_VERSION)]
+    OtherSchema {
+        /// The file.
+        path: PathBuf,
+        /// The version found.
+        found: u32,
+    },
+    /// The grid is not one.
+    #[error("{}: grid = {value}: {problem}", path.display())]
+    Grid {
+        /// The file.
+        path: PathBuf,
+        /// The value.
+        value: String,
+        /// What is wrong and what would be valid.
+        problem: String,
+    },
+    /// Robots have appeared or vanished.
+    #[error("{}: {found} final poses of {start} robots that started", path.display())]
+    Count {
+        /// The file.
+        path: PathBuf,
+        /// Starting poses.
+        start: usize,
+        /// Final poses.
+        found: usize,
+    },
+    /// The robots do not fit the grid.
+    #[error("{}: {error}", path.display())]
+    Poses {
+        /// The file.
+        path: PathBuf,
+        /// Which robot.
+        error: WorldError,
+    },
+}
+
+impl ReadRunError {
+    /// What is wrong, without what to do about it.
+    #[must_use]
+    pub fn cause(&self) -> &Self {
+        match self {
+            Self::Damaged { error, .. } => error,
+            other => other,
+        }
+    }
+}
+
+/// What is read of a `final.json`.
+#[derive(Clone, Debug)]
+pub struct FinalState {
+    /// The grid.
+    pub grid: Grid,
+    /// Where the swarm started from.
+    pub starts: Vec<Pose>,
+    /// Where it ended.
+    pub final_poses: Vec<Pose>,
+    /// The repetition that it was run from.
+    pub repetition: u32,
+    /// The run's hash.
+    pub hash: String,
+    /// The hash of the steps in between, if the file has it.
+    pub steps_hash: Option<RecordedHash>,
+    /// Movement M.
+    pub movement: f64,
+    /// Intended movement I.
+    pub intended_movement: f64,
+    /// Temperature of every step.
+    pub temperature: Vec<f64>,
+    /// Average prediction of every sensor.
+    pub average_prediction: Vec<f64>,
+}
+
+#[derive(Deserialize)]
+struct VersionOnly {
+    schema_version: u32,
+}
+
+fn check_version(path: &Path, bytes: &[u8]) -> Result<(), StateError> {
+    let read = serde_json::from_slice(bytes);
+    let version: VersionOnly = read.map_err(|error| StateError::Json {
+        path: path.to_owned(),
+        error,
+    })?;
+    if version.schema_version != SCHEMA_VERSION {
+        return Err(StateError::OtherSchema {
+            path: path.to_owned(),
+            found: version.schema_version,
+        });
+    }
+    Ok(())
+}
+
+/// Reads a `final.json`.
+///
+/// # Errors
+/// [`StateError`] names the file and the place.
+pub fn parse_final_state(path: &Path, bytes: &[u8]) -> Result<FinalState, StateError> {
+    let json = |error| StateError::Json {
+        path: path.to_owned(),
+        error,
+    };
+    check_version(path, bytes)?;
+    let file: FinalFile = serde_json::from_slice(bytes).map_err(json)?;
+    let grid = crate::settings::grid(&file.grid).map_err(|problem| StateError::Grid {
+        path: path.to_owned(),
+        value: file.grid.clone(),
+        problem,
+    })?;
+    if file.start.len() != file.r#final.len() {
+        return Err(StateError::Count {
+            path: path.to_owned(),
+            start: file.start.len(),
+            found: file.r#final.len(),
+        });
+    }
+    for poses in [&file.start, &file.r#final] {
+        check_poses(grid, poses).map_err(|error| StateError::Poses {
+            path: path.to_owned(),
+            error,
+        })?;
+    }
+    let recorded = |hash: Option<String>, version| hash.map(|hash| RecordedHash { version, hash });
+    Ok(FinalState {
+        grid,
+        starts: file.start,
+        final_poses: file.r#final,
+        repetition: file.repetition,
+        steps_hash: recorded(file.steps_hash_v2, Version::V2)
+            .or_else(|| recorded(file.steps_hash, Version::V1)),
+        hash: file.hash,
+        movement: file.measures.movement,
+        intended_movement: file.measures.intended_movement,
+        temperature: file.measures.temperature,
+        average_prediction: file.average_prediction,
+    })
+}
+
+fn best_fitness(path: &Path, most: u64) -> Result<Vec<f64>, ReadRunError> {
+    let bytes = files::read(path, most)?;
+    let mut table = csv::Reader::from_reader(bytes.as_slice());
+    let mut values = Vec::new();
+    for (expected, line) in (0..).zip(table.deserialize()) {
+        let line: GenerationRow = line.map_err(|error| ReadRunError::Generations {
+            path: path.to_owned(),
+            error,
+        })?;
+        if line.generation != expected {
+            return Err(ReadRunError::Value {
+                path: path.to_owned(),
+                problem: format!("generation {} where {expected} should be", line.generation),
+            });
+        }
+        values.push(line.best_fitness);
+    }
+    Ok(values)
+}
+
+/// A file of a run directory is there and can be read to an end.
+///
+/// # Errors
+/// [`ReadRunError`] if it is missing, or is a pipe or a device.
+pub fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
+    let path = run.join(file);
+    if files::exists(&path)? {
+        let kind = std::fs::metadata(&path).map_err(FileError::at(&path))?;
+        if kind.is_file() || kind.is_dir() {
+            return Ok(());
+        }
+        // A pipe would be waited for, and a device may have no end.
+        let error = std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a plain file");
+        return Err(FileError::at(&path)(error).into());
+    }
+    // Of a directory that is not there, no file is missing.
+    std::fs::metadata(run).map_err(FileError::at(run))?;
+    Err(ReadRunError::NotComplete {
+        path: run.to_owned(),
+        missing: file,
+    })
+}
+
+/// The settings in a run directory. The first population is past, so the ancestor is not looked for.
+///
+/// # Errors
+/// [`ReadRunError`] if one is missing or wrong.
+pub fn settings_of_run(run: &Path) -> Result<Settings, ReadRunError> {
+    settings_and_text_of_run(run).map(|(settings, _)| settings)
+}
+
+/// The same with their text, its lines ending with `\n` whatever an editor made of them.
+pub(crate) fn settings_and_text_of_run(run: &Path) -> Result<(Settings, String), ReadRunError> {
+    require(run, CONFIG)?;
+    let config = run.join(CONFIG);
+    let text = files::read_text(&config, TEXT_BYTES_MAX)?;
+    let mut given = Overrides::default();
+    given.text(&config, &text)?;
+    if let Some(missing) = given.missing() {
+        return Err(ReadRunError::Value {
+            path: config,
+            problem: format!("no {missing}, which every run records"),
+        });
+    }
+    given.remove("from");
+    Ok((Settings::resolve(&given, || 0)?, text))
+}
+
+fn read_final_state(path: &Path, settings: &Settings) -> Result<Vec<u8>, FileError> {
+    files::read(path, limits::most(limits::final_state_bytes(settings)))
+}
+
+fn recorded_hash(run: &Path) -> Result<String, ReadRunError> {
+    let path = run.join(DONE);
+    let bytes = files::read(&path, TEXT_BYTES_MAX)?;
+    ranges::hash_of(&String::from_utf8_lossy(&bytes))
+        .map_err(|problem| ReadRunError::Value { path, problem })
+}
+
+/// How far a run is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Nothing is there.
+    Pending,
+    /// It has begun.
+    Begun,
+    /// It is complete.
+    Done,
+}
+
+/// The hash of a run, if it is complete, by a quick look at its directory.
+///
+/// # Errors
+/// [`ReadRunError::Damaged`] if it is marked complete, but a file is missing or of another layout,
+/// or the mark is not its hash.
+pub fn complete(path: &Path) -> Result<Option<String>, ReadRunError> {
+    if !files::exists(&path.join(DONE))? {
+        return Ok(None);
+    }
+    let look = || {
+        require(path, DONE)?;
+        OF_COMPLETE
+            .into_iter()
+            .try_for_each(|file| require(path, file))?;
+        let state = path.join(FINAL);
+        let bytes = read_final_state(&state, &settings_of_run(path)?)?;
+        check_version(&state, &bytes)?;
+        recorded_hash(path)
+    };
+    look().map(Some).map_err(|error| ReadRunError::Damaged {
+        path: path.to_owned(),
+        error: Box::new(error),
+    })
+}
+
+impl FinishedRun {
+    /// Reads a run directory and runs it once more, for all who show or continue what happened: a
+    /// genome or a state that is another run's, or was changed, is found out here.
+    ///
+    /// # Errors
+    /// [`ReadRunError`] if [`read`](Self::read) fails, or the steps or where they end are not what
+    /// the run wrote down.
+    pub fn read_and_check(path: &Path) -> Result<Self, ReadRunError> {
+        let finished = Self::read(path)?;
+        let recorded = finished.steps_hash.as_ref();
+        let mut hash = StepsHash::new(
+            recorded.map_or_else(Version::default, |recorded| recorded.version),
+            &finished.trial(),
+            finished.settings.topology().model(),
+        );
+        let mut ends = finished.starts.clone();
+        finished
+            .replay(|world| {
+                hash.observe(world);
+                ends.copy_from_slice(world.poses());
+            })
+            .map_err(|error| StateError::Poses {
+                path: path.join(FINAL),
+                error,
+            })?;
+        let other_steps = recorded.is_some_and(|recorded| recorded.hash != hash.to_string());
+        if other_steps || ends != finished.final_poses {
+            return Err(ReadRunError::Inconsistent {
+                path: path.to_owned(),
+                problem: "best.genome does not take the steps that final.json records; one of its \
+                          files is another run's, or was changed",
+            });
+        }
+        Ok(finished)
+    }
+
+    /// Reads a run directory, if there is one and its run is complete.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn read_if_complete(path: &Path) -> Result<Option<Self>, ReadRunError> {
+        if !files::exists(&path.join(DONE))? {
+            return Ok(None);
+        }
+        Self::read(path).map(Some)
+    }
+
+    /// Reads a run directory.
+    ///
+    /// # Errors
+    /// [`ReadRunError`] if the run is not complete, or a file in it is wrong.
+    pub fn read(path: &Path) -> Result<Self, ReadRunError> {
+        require(path, DONE)?;
+        OF_COMPLETE
+            .into_iter()
+            .try_for_each(|file| require(path, file))?;
+        let settings = settings_of_run(path)?;
+        let genome_path = path.join(BEST);
+        let bytes = files::read(&genome_path, CONTAINER_BYTES_MAX as u64)?;
+        let encoded = EncodedGenome::decode(&bytes).map_err(|error| ReadRunError::Genome {
+            path: genome_path,
+            error,
+        })?;
+        let state_path = path.join(FINAL);
+        let state = parse_final_state(&state_path, &read_final_state(&state_path, &settings)?)?;
+        let inconsistent = |problem| {
+            Err(ReadRunError::Inconsistent {
+                path: path.to_owned(),
+                problem,
+            })
+        };
+        if encoded.topology() != settings.topology() {
+            return inconsistent("best.genome has another topology than config.toml");
+        }
+        if state.grid != settings.scenario().grid()
+            || state.starts.len() != settings.scenario().robots() as usize
+        {
+            return inconsistent("final.json has another grid or swarm size than config.toml");
+        }
+        if state.repetition >= settings.repetitions() {
+            return inconsistent("final.json is of a repetition that config.toml does not have");
+        }
+        if state.temperature.len() != settings.scenario().steps() as usize
+            || state.average_prediction.len() != settings.topology().sensors()
+        {
+            return inconsistent(
+                "final.json has another number of steps or sensors than config.toml",
+            );
+        }
+        let hash = recorded_hash(path)?;
+        if state.hash != hash {
+            return inconsistent("final.json has another hash than DONE");
+        }
+        let table_bytes = limits::most(limits::table_bytes(&settings));
+        let best_fitness = best_fitness(&path.join(GENERATIONS), table_bytes)?;
+        if best_fitness.len() != settings.generations() as usize {
+            return inconsistent(
+                "generations.csv has another number of lines than config.toml has generations",
+            );
+        }
+        let provenance = encoded.provenance();
+        if provenance.generation != settings.generations() - 1 {
+            return inconsistent("best.genome is not of the last generation of config.toml");
+        }
+        if provenance.matched_bits > provenance.scored_bits {
+            return inconsistent("best.genome has more matched bits than scored ones");
+        }
+        let meta_path = path.join(META);
+        let meta = serde_json::from_slice(&files::read(&meta_path, TEXT_BYTES_MAX)?);
+        let meta: Meta = meta.map_err(|error| ReadRunError::Json {
+            path: meta_path,
+            error,
+        })?;
+        Ok(Self {
+            genome: encoded.to_genome(),
+            provenance,
+            repetition: state.repetition,
+            starts: state.starts,
+            final_poses: state.final_poses,
+            hash,
+            steps_hash: state.steps_hash,
+            best_fitness,
+            movement: state.movement,
+            intended_movement: state.intended_movement,
+            temperature: state.temperature,
+            average_prediction: state.average_prediction,
+            program: meta.program(),
+            time: TimeSpent::read(path)?,
+            settings,
+        })
+    }
+
+    /// The trial that the final state came out of: its start and its noise.
+    #[must_use]
+    pub fn trial(&self) -> Trial {
+        let seeds = SeedTree::new(self.settings.seed());
+        let generation = self.provenance.generation;
+        let drawn = self
+            .settings
+            .scenario()
+            .trial(seeds, generation, self.repetition);
+        Trial {
+            starts: self.starts.clone(),
+            noise: drawn.noise,
+        }
+    }
+
+    /// Runs the genome once more from its start, showing every step.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the starting poses do not fit the grid.
+    pub fn replay(&self, observe: impl FnMut(&World)) -> Result<(), WorldError> {
+        let controller = Controller::new(&self.genome);
+        run(
+            &controller,
+            self.settings.scenario(),
+            &self.trial(),
+            observe,
+        )
+        .map(|_| ())
+    }
+
+    /// The measures of the run.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the starting poses do not fit the grid.
+    pub fn measures(&self) -> Result<Measures, WorldError> {
+        let grid = self.settings.scenario().grid();
+        let mut measures = Measures::starting_from(grid, self.settings.topology(), &self.starts);
+        self.replay(|world| measures.observe(world))?;
+        Ok(measures)
+    }
+
+    /// Everything that happened in the run.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the starting poses do not fit the grid.
+    pub fn trace(&self) -> Result<Trace, WorldError> {
+        let mut trace = Trace {
+            steps: Vec::new(),
+            final_poses: self.starts.clone(),
+        };
+        self.replay(|world| trace.record(world))?;
+        Ok(trace)
+    }
+}

@@ -1,0 +1,189 @@
+//! Re-evaluation: a genome from new starts, under the conditions it evolved in or others, and
+//! after damage (paper, Secs. 3.3.2 and 3.4).
+
+use crate::finished_run::FinishedRun;
+use minimal_surprise_controller::{Controller, Genome};
+use minimal_surprise_sim::damage::{Damage, DamageError};
+use minimal_surprise_sim::evaluation::run;
+use minimal_surprise_sim::metrics::{Match, similarity};
+use minimal_surprise_sim::structures::{LineOrientation, Structure, classify};
+use minimal_surprise_sim::{Pose, Scenario, SeedTree, Trial, WorldError};
+use rayon::prelude::*;
+
+/// What one run from a new start came to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rerun {
+    /// Fitness, 0 to 1.
+    pub fitness: f64,
+    /// Structures that the run is named after.
+    pub names: Vec<Structure>,
+    /// Share of robots in each structure at the end, as [`Structure::ALL`].
+    pub shares: [f64; 8],
+    /// Which way its lines run; none without lines.
+    pub orientation: Option<LineOrientation>,
+    /// Poses at the end.
+    pub final_poses: Vec<Pose>,
+}
+
+/// Runs a genome from so many new starts, in parallel.
+///
+/// # Errors
+/// [`WorldError`] does not come up: starts are drawn on the scenario's own grid.
+pub fn rerun(
+    genome: &Genome,
+    conditions: &Scenario,
+    seeds: SeedTree,
+    starts: u32,
+) -> Result<Vec<Rerun>, WorldError> {
+    let controller = Controller::new(genome);
+    (0..starts)
+        .into_par_iter()
+        .map(|start| {
+            let trial = conditions.reevaluation(seeds, start);
+            let outcome = run(&controller, conditions, &trial, |_| {})?;
+            let found = classify(conditions.grid(), &outcome.final_poses)?;
+            Ok(Rerun {
+                fitness: outcome.fitness(),
+                names: found.names(),
+                shares: Structure::ALL.map(|structure| found.share(structure)),
+                orientation: found.line_counts().orientation(),
+                final_poses: outcome.final_poses,
+            })
+        })
+        .collect()
+}
+
+/// A row of the paper's Tables 7 and 8: one value a repetition in every column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ResilienceRow {
+    /// What was done.
+    pub name: String,
+    /// Robots present.
+    pub robots: Vec<f64>,
+    /// Fitness over the run, 0 to 1.
+    pub fitness: Vec<f64>,
+    /// Share of the robots present in the structure at the start, 0 to 1.
+    pub share_start: Vec<f64>,
+    /// The same at the end.
+    pub share_end: Vec<f64>,
+    /// Similarity of the end to the undamaged final state, 0 to 1.
+    pub similarity: Vec<f64>,
+}
+
+/// The rows of Tables 7 and 8 for a run: as it evolved, from new starts, and after damage.
+///
+/// Without noise a removal is the same every time and is run once.
+///
+/// # Errors
+/// [`DamageError`] if the area or what is left of the swarm cannot be run.
+pub fn resilience(
+    finished: &FinishedRun,
+    structure: Structure,
+    damage: Damage,
+    repeat: u32,
+) -> Result<Vec<ResilienceRow>, DamageError> {
+    let conditions = finished.settings.scenario();
+    let seeds = SeedTree::new(finished.settings.seed());
+    let row = |name: &str, trials: Vec<(Scenario, Trial)>| {
+        resilience_row(finished, structure, name, &trials)
+    };
+    let initial = row("initial run", vec![(*conditions, finished.trial())])?;
+    let starts = (0..repeat)
+        .map(|start| (*conditions, conditions.reevaluation(seeds, start)))
+        .collect();
+    let starts = row("new starts", starts)?;
+    let damaged = after_damage(finished, structure, damage, repeat)?;
+    Ok(vec![initial, starts, damaged])
+}
+
+/// The row of [`resilience`] that is about the damage.
+///
+/// # Errors
+/// [`DamageError`] if the area or what is left of the swarm cannot be run.
+pub fn after_damage(
+    finished: &FinishedRun,
+    structure: Structure,
+    damage: Damage,
+    repeat: u32,
+) -> Result<ResilienceRow, DamageError> {
+    let conditions = finished.settings.scenario();
+    let seeds = SeedTree::new(finished.settings.seed());
+    let (name, times) = match damage {
+        Damage::Remove(_) if conditions.noise().is_none() => ("remove", 1),
+        Damage::Remove(_) => ("remove", repeat),
+        Damage::Reposition(_) => ("reposition", repeat),
+    };
+    let damaged = (0..times)
+        .map(|repetition| damage.trial(conditions, &finished.final_poses, seeds, repetition))
+        .collect::<Result<Vec<_>, _>>()?;
+    resilience_row(finished, structure, name, &damaged)
+}
+
+fn resilience_row(
+    finished: &FinishedRun,
+    structure: Structure,
+    name: &str,
+    trials: &[(Scenario, Trial)],
+) -> Result<ResilienceRow, DamageError> {
+    let controller = Controller::new(&finished.genome);
+    let matching: Match = structure.matching();
+    let values = trials
+        .par_iter()
+        .map(|(conditions, trial)| {
+            let outcome = run(&controller, conditions, trial, |_| {})?;
+            let share = |poses: &[Pose]| {
+                classify(conditions.grid(), poses).map(|found| found.share(structure))
+            };
+            Ok([
+                trial.starts.len() as f64,
+                outcome.fitness(),
+                share(&trial.starts)?,
+                share(&outcome.final_poses)?,
+                similarity(&outcome.final_poses, &finished.final_poses, matching),
+            ])
+        })
+        .collect::<Result<Vec<_>, DamageError>>()?;
+    let column = |index: usize| values.iter().map(|row| row[index]).collect();
+    Ok(ResilienceRow {
+        name: name.to_owned(),
+        robots: column(0),
+        fitness: column(1),
+        share_start: column(2),
+        share_end: column(3),
+        similarity: column(4),
+    })
+}
+
+/// Mean; 0 of nothing.
+#[must_use]
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Median, the mean of the middle two of an even number; 0 of nothing.
+#[must_use]
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    match sorted.len() {
+        0 => 0.0,
+        odd if odd % 2 == 1 => sorted[middle],
+        _ => f64::midpoint(sorted[middle - 1], sorted[middle]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mean_and_median_of_odd_even_and_no_values() {
+        assert_eq!(
+            (mean(&[1.0, 2.0, 6.0]), median(&[6.0, 1.0, 2.0])),
+            (3.0, 2.0)
+        );
+        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
+        assert_eq!((mean(&[]), median(&[])), (0.0, 0.0));
+    }
+}

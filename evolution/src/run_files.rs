@@ -1,0 +1,289 @@
+//! The files of a run directory: their names, and one type for the contents of each.
+//!
+//! | file | contents |
+//! |---|---|
+//! | `config.toml` | [`Settings`], resolved, with the seed |
+//! | `meta.json` | [`Meta`]: which program made the run |
+//! | `generations.csv` | one [`GenerationRow`] per generation |
+//! | `best.genome` | the last generation's best genome, as a container for robots |
+//! | `time.json` | [`TimeSpent`](crate::time_spent::TimeSpent), over all sittings |
+//! | `final.json` | [`FinalFile`]: start, end, fitness and average predictions of the final run |
+//! | `DONE` | the run's hash; the run is complete |
+//! | `checkpoint` | until the run is complete: the state from which it is resumed |
+
+use crate::experiment::{Experiment, Finding, GenerationRecord};
+use crate::ranges;
+use crate::settings::{Settings, model_name, seed_text};
+use minimal_surprise_controller::KERNEL_ID;
+use minimal_surprise_sim::metrics::Measures;
+use minimal_surprise_sim::{Pose, Structure};
+use serde::{Deserialize, Serialize, Serializer};
+use serde_json::value::to_raw_value;
+
+/// Settings.
+pub const CONFIG: &str = "config.toml";
+/// Schema version, seed, program.
+pub const META: &str = "meta.json";
+/// One row per generation.
+pub const GENERATIONS: &str = "generations.csv";
+/// The last generation's best genome.
+pub const BEST: &str = "best.genome";
+/// Start and end of the final run.
+pub const FINAL: &str = "final.json";
+/// How long the run took.
+pub const TIME: &str = "time.json";
+/// Marks a run as complete, and holds its hash.
+pub const DONE: &str = "DONE";
+/// Until the run is complete: the state from which it is resumed.
+pub const CHECKPOINT: &str = "checkpoint";
+
+/// Files without which a complete run cannot be read, besides [`DONE`].
+pub const OF_COMPLETE: [&str; 5] = [CONFIG, META, BEST, FINAL, GENERATIONS];
+
+/// Version of the layout of `meta.json` and `final.json`.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// The program that makes a run.
+#[derive(Clone, Debug, Default)]
+pub struct Program {
+    /// Its name.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+    /// The revision of its source.
+    pub revision: String,
+    /// The compiler that built it.
+    pub compiler: String,
+    /// How it was called.
+    pub command_line: Vec<String>,
+}
+
+/// `meta.json`: how the run was made.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Meta {
+    schema_version: u32,
+    seed: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    seed_text: Option<String>,
+    program: String,
+    program_version: String,
+    revision: String,
+    compiler: String,
+    kernel: String,
+    command_line: Vec<String>,
+}
+
+impl Meta {
+    /// How a run with these settings is made.
+    #[must_use]
+    pub fn new(settings: &Settings, program: &Program) -> Self {
+        let program = program.clone();
+        Self {
+            schema_version: SCHEMA_VERSION,
+            seed: settings.seed(),
+            seed_text: seed_text(settings.seed()),
+            program: program.name,
+            program_version: program.version,
+            revision: program.revision,
+            compiler: program.compiler,
+            kernel: KERNEL_ID.to_string(),
+            command_line: program.command_line,
+        }
+    }
+
+    /// The program in words.
+    #[must_use]
+    pub fn program(&self) -> String {
+        let Self {
+            program,
+            program_version,
+            revision,
+            ..
+        } = self;
+        format!("{program} {program_version}, revision {revision}")
+    }
+}
+
+/// `final.json`: the run of the last generation's best genome, from the start that gave it its
+/// fitness. Poses are `[x, y, heading]`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct FinalFile {
+    pub schema_version: u32,
+    #[serde(deserialize_with = "ranges::hash")]
+    pub hash: String,
+    /// Of version 1, in files of older programs.
+    #[serde(
+        default,
+        deserialize_with = "ranges::optional_hash",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub steps_hash: Option<String>,
+    #[serde(
+        default,
+        deserialize_with = "ranges::optional_hash",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub steps_hash_v2: Option<String>,
+    pub seed: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed_text: Option<String>,
+    pub grid: String,
+    pub sensor_model: String,
+    pub robots: u32,
+    pub steps: u32,
+    pub generation: u32,
+    pub repetition: u32,
+    pub fitness: f64,
+    pub matches: u64,
+    pub scored_bits: u64,
+    #[serde(deserialize_with = "ranges::fractions")]
+    pub average_prediction: Vec<f64>,
+    pub names: Vec<String>,
+    pub share: f64,
+    pub measures: MeasuresOfRun,
+    #[serde(serialize_with = "one_line")]
+    pub start: Vec<Pose>,
+    #[serde(serialize_with = "one_line")]
+    pub r#final: Vec<Pose>,
+}
+
+/// Measures of one run of a swarm.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct MeasuresOfRun {
+    pub fitness: f64,
+    #[serde(deserialize_with = "ranges::fraction")]
+    pub intended_movement: f64,
+    #[serde(deserialize_with = "ranges::fraction")]
+    pub movement: f64,
+    pub period_steps: u32,
+    pub surprise: Vec<f64>,
+    #[serde(deserialize_with = "ranges::fractions")]
+    pub temperature: Vec<f64>,
+}
+
+impl From<&Measures> for MeasuresOfRun {
+    fn from(measures: &Measures) -> Self {
+        Self {
+            fitness: measures.fitness(),
+            intended_movement: measures.intended_movement(),
+            movement: measures.movement(),
+            period_steps: measures.period(),
+            surprise: measures.surprise(),
+            temperature: measures.temperature(),
+        }
+    }
+}
+
+impl FinalFile {
+    /// The file of a result.
+    #[must_use]
+    pub fn new(settings: &Settings, finding: &Finding) -> Self {
+        let scenario = settings.scenario();
+        Self {
+            schema_version: SCHEMA_VERSION,
+            hash: finding.hash.to_string(),
+            steps_hash: None,
+            steps_hash_v2: Some(finding.steps_hash.to_string()),
+            seed: settings.seed(),
+            seed_text: seed_text(settings.seed()),
+            grid: scenario.grid().to_string(),
+            sensor_model: model_name(settings.topology().model()).to_owned(),
+            robots: scenario.robots(),
+            steps: scenario.steps(),
+            generation: finding.provenance.generation,
+            repetition: finding.repetition,
+            fitness: finding.outcome.fitness(),
+            matches: finding.outcome.matches,
+            scored_bits: finding.outcome.scored_bits,
+            average_prediction: finding.outcome.average_prediction(),
+            names: names(&finding.structures.names()),
+            share: finding.share(),
+            measures: (&finding.measures).into(),
+            start: finding.starts.clone(),
+            r#final: finding.outcome.final_poses.clone(),
+        }
+    }
+}
+
+/// Names of structures.
+#[must_use]
+pub fn names(structures: &[Structure]) -> Vec<String> {
+    structures.iter().map(|s| s.name().to_owned()).collect()
+}
+
+/// A row of `generations.csv`. Movement, structure and share are those of the best genome in the
+/// repetition that gave it its fitness.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct GenerationRow {
+    pub generation: u32,
+    #[serde(deserialize_with = "ranges::fraction")]
+    pub best_fitness: f64,
+    pub mean_fitness: f64,
+    pub worst_fitness: f64,
+    pub best_matches: u64,
+    pub total_matches: u64,
+    pub best_slot: u32,
+    pub worst_repetition: u32,
+    pub movement: f64,
+    pub intended_movement: f64,
+    pub structure: String,
+    pub share: f64,
+}
+
+impl GenerationRow {
+    /// The row of a generation.
+    #[must_use]
+    pub fn new(settings: &Settings, record: &GenerationRecord) -> Self {
+        let scored = settings.scored_bits() as f64;
+        Self {
+            generation: record.generation,
+            best_fitness: record.best_matches as f64 / scored,
+            mean_fitness: record.total_matches as f64 / scored / f64::from(settings.population()),
+            worst_fitness: record.worst_matches as f64 / scored,
+            best_matches: record.best_matches,
+            total_matches: record.total_matches,
+            best_slot: record.best_slot,
+            worst_repetition: record.worst_repetition,
+            movement: record.movement,
+            intended_movement: record.intended_movement,
+            structure: record.structure.clone(),
+            share: record.share,
+        }
+    }
+}
+
+/// The text of `generations.csv`.
+///
+/// # Panics
+/// Does not: rows of numbers are written to memory.
+#[must_use]
+pub fn generations(experiment: &Experiment) -> String {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for record in experiment.history() {
+        table
+            .serialize(GenerationRow::new(experiment.settings(), record))
+            .expect("rows of numbers are written to memory");
+    }
+    let bytes = table.into_inner().expect("memory needs no flushing");
+    String::from_utf8(bytes).expect("numbers are ASCII")
+}
+
+/// The text of a JSON file.
+///
+/// # Panics
+/// Does not for values whose keys are text, as all here.
+#[must_use]
+pub fn json(value: &impl Serialize) -> String {
+    let mut text = serde_json::to_string_pretty(value).expect("plain values");
+    text.push('\n');
+    text
+}
+
+/// Poses without a line break for every number.
+fn one_line<S: Serializer>(poses: &[Pose], serializer: S) -> Result<S::Ok, S::Error> {
+    let poses = to_raw_value(poses).map_err(serde::ser::Error::custom)?;
+    poses.serialize(serializer)
+}

@@ -1,0 +1,471 @@
+//! Text that users chose, turned into what a file system, a page, a link, a shell, a compiler or a
+//! terminal reads as that text and as nothing else; and the way in: bytes of a text file into text.
+
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_decode_str, percent_encode};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
+use std::ffi::{OsStr, OsString};
+use std::fmt::Write;
+use std::path::{Component, Path, PathBuf};
+
+/// Most bytes of a [`file_name`]: file systems take 255, so that endings, and the names of
+/// temporary files made of it, have room.
+pub const FILE_NAME_BYTES_MAX: usize = 100;
+
+/// Hexadecimal digits of the hash in a [`file_name`].
+const HASH_DIGITS: usize = 12;
+
+/// What Windows takes for a device, whatever follows a dot after it.
+const DEVICES: [&str; 6] = ["con", "prn", "aux", "nul", "com", "lpt"];
+
+/// A name for a file, from any text. Different texts get different names, also where the file
+/// system ignores case. A text of `a` to `z`, `0` to `9`, `-`, `_` and `.` is its own name; any
+/// other keeps its letters and digits and gets a hash of the whole text at the end.
+#[must_use]
+pub fn file_name(text: &str) -> String {
+    if is_file_name(text) {
+        text.to_owned()
+    } else {
+        hashed_file_name(text)
+    }
+}
+
+/// The same where one name is taken by something else.
+#[must_use]
+pub fn file_name_except(text: &str, taken: &str) -> String {
+    match file_name(text) {
+        name if name == taken => hashed_file_name(text),
+        name => name,
+    }
+}
+
+/// The same where some names are taken, also by the same text; the name is taken afterwards.
+#[must_use]
+pub fn new_file_name(text: &str, taken: &mut BTreeSet<String>) -> String {
+    let mut name = file_name(text);
+    for number in 2_u64.. {
+        if taken.insert(name.clone()) {
+            break;
+        }
+        name = file_name(&format!("{text}-{number}"));
+    }
+    name
+}
+
+fn hashed_file_name(text: &str) -> String {
+    let mut name = String::new();
+    for c in text.chars() {
+        if c.is_ascii_alphanumeric() || "_.".contains(c) {
+            name.push(c);
+        } else if !name.ends_with('-') {
+            name.push('-');
+        }
+    }
+    name.truncate(FILE_NAME_BYTES_MAX - HASH_DIGITS - 2);
+    let trimmed = name.trim_matches(['-', '.']);
+    let front = if trimmed.is_empty() || is_device(trimmed) {
+        "_"
+    } else {
+        ""
+    };
+    let hash = hex(&Sha256::digest(text.as_bytes()));
+    format!("{front}{trimmed}-{}", &hash[..HASH_DIGITS])
+}
+
+/// Whether a text can be its own name. What ends like a name with a hash cannot: it would be that
+/// of another text.
+fn is_file_name(text: &str) -> bool {
+    let plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b"-_.".contains(&b);
+    let is_hash = |end: &str| {
+        end.len() == HASH_DIGITS && end.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
+    };
+    !text.is_empty()
+        && text.len() <= FILE_NAME_BYTES_MAX
+        && text.bytes().all(plain)
+        && !text.starts_with(['.', '-'])
+        && !text.ends_with('.')
+        && !is_device(text)
+        && !text.rsplit_once('-').is_some_and(|(_, end)| is_hash(end))
+}
+
+fn is_device(name: &str) -> bool {
+    let stem = name
+        .split('.')
+        .next()
+        .unwrap_or_default()
+        .to_ascii_lowercase();
+    DEVICES.contains(&stem.trim_end_matches(|c: char| c.is_ascii_digit()))
+}
+
+/// Bytes as hexadecimal digits, two each.
+#[must_use]
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Most letters and digits of a text that [`identifier`] keeps: C looks at 63 characters.
+const IDENTIFIER_MAX: usize = 24;
+
+/// What C and Rust have for themselves.
+const KEYWORDS: &str = "abstract alignas alignof as async auto await become bool box break case char \
+    const constexpr continue crate default do double dyn else enum extern false final float fn for \
+    gen goto if impl in inline int let long loop macro main match mod move mut nullptr override \
+    priv pub ref register restrict return self short signed sizeof static static_assert struct \
+    super switch thread_local trait true try type typedef typeof typeof_unqual union unsafe \
+    unsigned unsized use virtual void volatile where while yield";
+
+/// A part of an identifier of C and Rust, from any text: its first ASCII letters and digits.
+#[must_use]
+pub fn identifier(text: &str) -> String {
+    let mut name = String::new();
+    for c in text.chars() {
+        if c.is_ascii_alphanumeric() {
+            name.push(c.to_ascii_lowercase());
+        } else if !name.is_empty() && !name.ends_with('_') {
+            name.push('_');
+        }
+    }
+    name.truncate(IDENTIFIER_MAX);
+    name.trim_end_matches('_').to_owned()
+}
+
+/// An identifier of C and Rust.
+///
+/// # Errors
+/// What would be valid.
+pub fn checked_identifier(text: &str) -> Result<&str, &'static str> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let is_keyword = KEYWORDS.split_whitespace().any(|keyword| keyword == text);
+    if text.starts_with(|c: char| c.is_ascii_alphabetic())
+        && text.chars().all(plain)
+        && text.len() <= 63
+        && !is_keyword
+    {
+        Ok(text)
+    } else {
+        Err(
+            "expected an identifier of C and Rust: up to 63 letters, digits and _, a letter first, \
+             no keyword",
+        )
+    }
+}
+
+/// Whether a character can neither be seen nor is an ordinary blank: controls, line ends, what
+/// changes the direction of writing, what has no width.
+#[must_use]
+pub fn is_hidden(c: char) -> bool {
+    c.is_control()
+        || matches!(c,
+            '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{17b4}' | '\u{17b5}'
+            | '\u{180b}'..='\u{180f}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
+            | '\u{2060}'..='\u{206f}' | '\u{2800}' | '\u{3164}' | '\u{fe00}'..='\u{fe0f}' | '\u{feff}'
+            | '\u{ffa0}' | '\u{fff0}'..='\u{fffb}' | '\u{1bca0}'..='\u{1bca3}'
+            | '\u{1d173}'..='\u{1d17a}' | '\u{e0000}'..='\u{e0fff}')
+}
+
+/// Text as a terminal may show it, in one line: what [`is_hidden`] is written as `\n`, `\u{1b}`.
+#[must_use]
+pub fn terminal(text: &str) -> String {
+    visible(text, "")
+}
+
+/// Text of several lines, likewise: line ends and tabs stay.
+#[must_use]
+pub fn terminal_lines(text: &str) -> String {
+    visible(text, "\n\t")
+}
+
+/// A path as a terminal may show it; bytes that are no text are written as `\xff`.
+#[must_use]
+pub fn terminal_path(path: &Path) -> String {
+    let mut shown = String::new();
+    for chunk in path.as_os_str().as_encoded_bytes().utf8_chunks() {
+        shown += &terminal(chunk.valid());
+        for byte in chunk.invalid() {
+            let _ = write!(shown, "\\x{byte:02x}");
+        }
+    }
+    shown
+}
+
+fn visible(text: &str, but: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        if is_hidden(c) && !but.contains(c) {
+            shown.extend(c.escape_default());
+        } else {
+            shown.push(c);
+        }
+    }
+    shown
+}
+
+/// The text as a terminal without UTF-8 can show it.
+#[must_use]
+pub fn ascii(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for letter in text.chars() {
+        let like = match letter {
+            letter if letter.is_ascii() => {
+                shown.push(letter);
+                continue;
+            }
+            '▶' | '▷' | '▸' => ">",
+            '▲' | '△' | '▴' => "^",
+            '◀' | '◁' | '◂' => "<",
+            '▼' | '▽' | '▾' => "v",
+            '·' => ".",
+            '–' | '—' | '−' | '─' => "-",
+            '━' => "=",
+            '…' => "...",
+            '×' => "x",
+            '✘' => "X",
+            '■' | '█' => "#",
+            '□' => "+",
+            '●' => "@",
+            '○' => "o",
+            '░' => ":",
+            '←' => "<",
+            '→' => ">",
+            '↑' => "^",
+            '↓' => "v",
+            '▁' => "_",
+            '▂' => ".",
+            '▃' => "-",
+            '▄' => "=",
+            '▅' => "+",
+            '▆' => "*",
+            '▇' => "%",
+            '⁰'..='⁹' | '²' | '³' | '¹' => "^",
+            _ => {
+                shown.extend(letter.escape_unicode());
+                continue;
+            }
+        };
+        shown.push_str(like);
+    }
+    shown
+}
+
+/// Text as text in HTML, also between quotes.
+#[must_use]
+pub fn html(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in terminal(text).chars() {
+        match c {
+            '&' => escaped += "&amp;",
+            '<' => escaped += "&lt;",
+            '>' => escaped += "&gt;",
+            '"' => escaped += "&quot;",
+            '\'' => escaped += "&#39;",
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}
+
+/// Text as text in Markdown: in a paragraph, a list or the cell of a table.
+#[must_use]
+pub fn markdown(text: &str) -> String {
+    let shown = terminal(text);
+    // Leading blanks can turn text into code, and no reader shows them.
+    let shown = shown.trim_matches(' ');
+    let mut escaped = String::with_capacity(shown.len());
+    for (place, c) in shown.char_indices() {
+        let (before, after) = (&shown[..place], &shown[place + c.len_utf8()..]);
+        let means_something = match c {
+            '\\' | '`' | '*' | '_' | '[' | ']' | '|' | '~' | '$' => true,
+            '<' => after.starts_with(|c: char| c.is_alphabetic() || "/!?".contains(c)),
+            '&' => after.starts_with(|c: char| c.is_alphabetic() || c == '#'),
+            '#' | '+' | '-' | '=' | '>' => before.is_empty(),
+            '.' | ')' => {
+                before.bytes().all(|b| b.is_ascii_digit())
+                    && (after.is_empty() || after.starts_with(' '))
+            }
+            _ => false,
+        };
+        if means_something {
+            escaped.push('\\');
+        }
+        escaped.push(c);
+    }
+    escaped
+}
+
+/// Text as code in Markdown.
+#[must_use]
+pub fn markdown_code(text: &str) -> String {
+    let shown = terminal(text);
+    let runs = shown.split(|c| c != '`').map(str::len);
+    let fence = "`".repeat(1 + runs.max().unwrap_or(0));
+    // One blank at each end is dropped by whoever reads it.
+    let pad = if shown.is_empty() || shown.starts_with(['`', ' ']) || shown.ends_with(['`', ' ']) {
+        " "
+    } else {
+        ""
+    };
+    format!("{fence}{pad}{shown}{pad}{fence}")
+}
+
+/// Text as code in the cell of a Markdown table, where a bar ends the cell even in code.
+#[must_use]
+pub fn markdown_code_cell(text: &str) -> String {
+    markdown_code(text).replace('|', r"\|")
+}
+
+/// What stands for itself in a part of a URL.
+const IN_URL: &AsciiSet = &NON_ALPHANUMERIC
+    .remove(b'-')
+    .remove(b'.')
+    .remove(b'_')
+    .remove(b'~');
+
+/// A path as a URL: a relative path as a relative one.
+#[must_use]
+pub fn url(path: &Path) -> String {
+    let mut url = String::new();
+    for component in path.components() {
+        if !url.is_empty() && !url.ends_with('/') {
+            url.push('/');
+        }
+        match component {
+            Component::RootDir => url.push('/'),
+            other => {
+                let bytes = other.as_os_str().as_encoded_bytes();
+                url.extend(percent_encode(bytes, IN_URL));
+            }
+        }
+    }
+    url
+}
+
+/// What a path begins with where it is stored as text and is none: a URL.
+const FILE_URL: &str = "file://";
+
+/// A path as text that [`path_of_text`] makes the same path of: as it is, or, where it is not
+/// UTF-8, as a URL with the whole path.
+#[must_use]
+pub fn text_of_path(path: &Path) -> String {
+    match path.to_str() {
+        Some(text) if !text.starts_with(FILE_URL) => text.to_owned(),
+        _ => {
+            let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+            format!("{FILE_URL}{}", url(&whole))
+        }
+    }
+}
+
+/// The path that a text stands for.
+#[must_use]
+pub fn path_of_text(text: &str) -> PathBuf {
+    match text.strip_prefix(FILE_URL) {
+        None => PathBuf::from(text),
+        Some(url) => PathBuf::from(os_string(percent_decode_str(url).collect())),
+    }
+}
+
+#[cfg(unix)]
+fn os_string(bytes: Vec<u8>) -> OsString {
+    std::os::unix::ffi::OsStringExt::from_vec(bytes)
+}
+
+#[cfg(not(unix))]
+fn os_string(bytes: Vec<u8>) -> OsString {
+    String::from_utf8_lossy(&bytes).into_owned().into()
+}
+
+/// A word that a POSIX shell reads as this argument: printable, and of one line unless the word ends
+/// with a line end.
+#[must_use]
+pub fn shell_word(word: impl AsRef<OsStr>) -> String {
+    let word = word.as_ref();
+    let plain = |c: char| c.is_alphanumeric() && !is_hidden(c) || "/._-+:,@".contains(c);
+    match word.to_str() {
+        Some(text) if !text.is_empty() && text.chars().all(plain) => text.to_owned(),
+        Some(text) if !text.chars().any(is_hidden) => {
+            format!("'{}'", text.replace('\'', r"'\''"))
+        }
+        _ => printf_word(word.as_encoded_bytes()),
+    }
+}
+
+/// The word as what `printf` prints. A shell drops line ends at the end of that, so they stand behind.
+fn printf_word(word: &[u8]) -> String {
+    let line_ends = word.iter().rev().take_while(|&&byte| byte == b'\n').count();
+    let mut code = String::from("\"$(printf '");
+    for chunk in word[..word.len() - line_ends].utf8_chunks() {
+        for c in chunk.valid().chars() {
+            if c.is_alphanumeric() && !is_hidden(c) || " /._-+:,@=".contains(c) {
+                code.push(c);
+            } else {
+                octal(&mut code, c.encode_utf8(&mut [0; 4]).as_bytes());
+            }
+        }
+        octal(&mut code, chunk.invalid());
+    }
+    code += "')\"";
+    if line_ends > 0 {
+        let _ = write!(code, "'{}'", "\n".repeat(line_ends));
+    }
+    code
+}
+
+fn octal(code: &mut String, bytes: &[u8]) {
+    for byte in bytes {
+        let _ = write!(code, "\\{byte:03o}");
+    }
+}
+
+/// A path as a word for a shell; one that begins with a dash would be taken for a flag.
+#[must_use]
+pub fn shell_path(path: &Path) -> String {
+    if path.as_os_str().as_encoded_bytes().starts_with(b"-") {
+        shell_word(Path::new(".").join(path))
+    } else {
+        shell_word(path)
+    }
+}
+
+/// Bytes that are no text.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TextError {
+    /// It is text, in UTF-16.
+    #[error("the text is in UTF-16; save it as UTF-8")]
+    Utf16,
+    /// It is not UTF-8.
+    #[error("line {line}: byte {byte} of the file is not UTF-8; save it as UTF-8")]
+    NotUtf8 {
+        /// The line, from 1.
+        line: usize,
+        /// The byte's place in the file, from 1.
+        byte: usize,
+    },
+}
+
+/// The text of a text file, whatever program saved it: without a byte order mark, its lines ending
+/// with `\n`.
+///
+/// # Errors
+/// [`TextError`] if it is not UTF-8.
+pub fn decode(bytes: &[u8]) -> Result<String, TextError> {
+    // A byte order mark, or ASCII with zeros between: no text that is read here begins otherwise.
+    if matches!(
+        bytes,
+        [0xff, 0xfe, ..]
+            | [0xfe, 0xff, ..]
+            | [1..=127, 0, 1..=127, 0, ..]
+            | [0, 1..=127, 0, 1..=127, ..]
+    ) {
+        return Err(TextError::Utf16);
+    }
+    let rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let text = std::str::from_utf8(rest).map_err(|error| {
+        let before = &rest[..error.valid_up_to()];
+        TextError::NotUtf8 {
+            line: 1 + before.iter().filter(|&&byte| byte == b'\n').count(),
+            byte: 1 + bytes.len() - rest.len() + before.len(),
+        }
+    })?;
+    Ok(text.replace("\r\n", "\n"))
+}

@@ -1,0 +1,160 @@
+//! Settings as flags, made from their table; and the conditions of one run, which a run directory
+//! records and a genome takes from flags.
+
+use super::BadInput;
+use clap::builder::{OsStringValueParser, ValueParser};
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
+use minimal_surprise_controller::{EncodedGenome, Prediction};
+use minimal_surprise_evolution::settings::{Overrides, SETTINGS, Setting, Settings, model_name};
+use minimal_surprise_evolution::text::text_of_path;
+use std::ffi::OsString;
+use std::path::Path;
+
+fn arg(setting: &Setting, help: String) -> Arg {
+    let arg = Arg::new(setting.name)
+        .long(setting.name)
+        .value_name(setting.value_name)
+        .help(help);
+    if setting.is_path {
+        arg.value_parser(ValueParser::new(OsStringValueParser::new()))
+    } else {
+        arg.allow_hyphen_values(true)
+    }
+}
+
+fn with_default(text: &str, default: &str) -> String {
+    match default {
+        "" => text.to_owned(),
+        default => format!("{text} [default: {default}]"),
+    }
+}
+
+fn values_of<'a>(matches: &ArgMatches, settings: impl Iterator<Item = &'a Setting>) -> Overrides {
+    let mut overrides = Overrides::default();
+    for setting in settings {
+        if setting.is_path {
+            let path = matches.get_one::<OsString>(setting.name);
+            overrides.flag(
+                setting.name,
+                path.map(|path| text_of_path(Path::new(path))).as_deref(),
+            );
+        } else {
+            let text = matches.get_one::<String>(setting.name);
+            overrides.flag(setting.name, text.map(String::as_str));
+        }
+    }
+    overrides
+}
+
+/// All settings as flags.
+#[derive(Clone, Debug, Default)]
+pub struct SettingFlags(pub(super) Overrides);
+
+impl Args for SettingFlags {
+    fn augment_args(command: Command) -> Command {
+        command.args(SETTINGS.iter().map(|setting| {
+            let arg = arg(setting, with_default(setting.meaning(), setting.default));
+            // A run goes on under its own settings, on any number of threads.
+            match setting.name {
+                "threads" => arg,
+                _ => arg.conflicts_with("resume"),
+            }
+        }))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for SettingFlags {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Ok(Self(values_of(matches, SETTINGS.iter())))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+/// Settings that a run of a genome has besides those in its file.
+const CONDITIONS: [&str; 5] = ["grid", "robots", "steps", "noise", "seed"];
+
+fn conditions() -> impl Iterator<Item = &'static Setting> {
+    SETTINGS.iter().filter(|s| CONDITIONS.contains(&s.name))
+}
+
+/// Flags that go with a genome file.
+#[derive(Clone, Debug, Default)]
+pub struct GenomeConditions(Overrides);
+
+impl Args for GenomeConditions {
+    fn augment_args(command: Command) -> Command {
+        command.args(conditions().map(|setting| {
+            let (meaning, default) = match setting.name {
+                "seed" => (
+                    "Root of all random numbers",
+                    "the seed it evolved with, else 0",
+                ),
+                _ => (setting.meaning(), setting.default),
+            };
+            let help = format!(
+                "For a genome: {}{}",
+                meaning[..1].to_lowercase(),
+                &meaning[1..]
+            );
+            arg(setting, with_default(&help, default))
+        }))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for GenomeConditions {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Ok(Self(values_of(matches, conditions())))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl GenomeConditions {
+    /// Refuses flags beside something that records the conditions itself.
+    ///
+    /// # Errors
+    /// [`BadInput`] names the flag.
+    pub(super) fn refuse_beside(&self, what: &str, path: &Path) -> Result<(), BadInput> {
+        match conditions().find(|setting| self.0.place(setting.name).is_some()) {
+            None => Ok(()),
+            Some(Setting { name, .. }) => Err(BadInput::new(format!(
+                "--{name} and {what} exclude each other; {} says what to run",
+                path.display()
+            ))),
+        }
+    }
+
+    /// The settings of a run of a genome.
+    ///
+    /// # Errors
+    /// [`BadInput`] names the flag, the value and what would be valid.
+    pub(super) fn settings(&self, encoded: &EncodedGenome<'_>) -> Result<Settings, BadInput> {
+        let topology = encoded.topology();
+        let mut overrides = self.0.clone();
+        overrides.flag("sensor-model", Some(model_name(topology.model())));
+        match topology.prediction() {
+            Prediction::Free => {}
+            Prediction::PartlyPredefined(template) => {
+                overrides.flag("predefine-partly", Some(template.name()));
+            }
+            Prediction::Predefined(template) => overrides.flag("predefine", Some(template.name())),
+        }
+        let seed = encoded.provenance().seed.unwrap_or(0);
+        Settings::resolve(&overrides, || seed).map_err(BadInput::new)
+    }
+}

@@ -1,0 +1,189 @@
+//! The states of a recording as text for a page: bytes, deflated, in base64.
+//!
+//! The page reckons again whatever follows from poses (what is sensed), from moves (the poses
+//! themselves) or from the key of the noise (what it flipped), so that only what robots did,
+//! expected and belong to is stored.
+//!
+//! | what | bytes |
+//! |---|---|
+//! | x, then y of the starts | two a robot |
+//! | headings of the starts | one a robot |
+//! | mispredicted bits of each step; robots that moved in it | four a step |
+//! | robots in the structure in each state | four a state |
+//! | blocks of [`BLOCK`] steps, see below | |
+//!
+//! A block has `n` steps and their `n + 1` states, the last of which is the first of the next
+//! block. It is made of planes: a byte a robot and step (or state), all of one robot after the
+//! other. A plane of states has the change (exclusive or) from the state before, in the first state
+//! the byte itself. Numbers are little-endian.
+//!
+//! | plane of a block | of | if |
+//! |---|---|---|
+//! | move: bit 0 action, bit 1 turn, bit 2 whether it moved | steps | robots have minds |
+//! | prediction, low byte; high byte | states | robots have minds; more than 8 sensors |
+//! | x low, x high, y low, y high, heading | states | robots have no minds |
+//! | structures | states | |
+
+use crate::recording::Recording;
+use data_encoding::BASE64;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use minimal_surprise_sim::Pose;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::io::Write;
+
+/// Steps of a block: what the page decodes at once.
+pub const BLOCK: usize = 128;
+
+/// What the page has to know to read the bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Layout {
+    /// Number of robots.
+    pub robots: usize,
+    /// Number of steps; there is one state more.
+    pub steps: usize,
+    /// Steps of a block.
+    pub block: usize,
+    /// Whether anything is known but poses.
+    pub minds: bool,
+    /// Bytes of a prediction.
+    pub prediction_bytes: usize,
+}
+
+/// The layout, and the text.
+#[must_use]
+pub fn encode(recording: &Recording) -> (Layout, String) {
+    let layout = Layout {
+        robots: recording.robots(),
+        steps: recording.steps(),
+        block: BLOCK,
+        minds: recording.minds.is_some(),
+        prediction_bytes: sensors(recording).div_ceil(8),
+    };
+    let mut bytes = Vec::new();
+    let starts = recording.poses(0);
+    bytes.extend(starts.iter().flat_map(|pose| pose.x.to_le_bytes()));
+    bytes.extend(starts.iter().flat_map(|pose| pose.y.to_le_bytes()));
+    bytes.extend(starts.iter().map(|pose| pose.heading as u8));
+    for count in counts(recording) {
+        bytes.extend(count.to_le_bytes());
+    }
+    let firsts: Vec<usize> = (0..layout.steps).step_by(BLOCK).collect();
+    let blocks: Vec<Vec<u8>> = firsts
+        .par_iter()
+        .map(|&first| block(recording, layout, first))
+        .collect();
+    (layout, packed(&[&[bytes][..], &blocks].concat()))
+}
+
+/// Bytes as text: deflated with zlib's header, in base64.
+#[must_use]
+pub fn packed(parts: &[Vec<u8>]) -> String {
+    let mut deflate = ZlibEncoder::new(Vec::new(), Compression::default());
+    for part in parts {
+        // A vector takes whatever is written to it.
+        let _ = deflate.write_all(part);
+    }
+    BASE64.encode(&deflate.finish().unwrap_or_default())
+}
+
+fn sensors(recording: &Recording) -> usize {
+    recording
+        .minds
+        .as_ref()
+        .map_or(0, |minds| minds.topology.sensors())
+}
+
+/// Of each step the mispredicted bits and the robots that moved, of each state the robots in the
+/// structure.
+fn counts(recording: &Recording) -> impl Iterator<Item = u32> {
+    let steps = 0..recording.steps();
+    let mispredicted = steps.clone().map(move |t| {
+        let bits = (0..recording.robots()).filter_map(move |robot| {
+            let sensed = recording.sensed(t, robot)?;
+            Some(sensed.differing(recording.predicted(t, robot)?))
+        });
+        bits.sum()
+    });
+    let moved = steps.map(move |t| {
+        let (from, to) = (recording.poses(t), recording.poses(t + 1));
+        let moved = from.iter().zip(to).filter(|&(&a, &b)| has_moved(a, b));
+        moved.count() as u32
+    });
+    let members = (0..=recording.steps()).map(move |t| recording.in_structure(t) as u32);
+    mispredicted.chain(moved).chain(members)
+}
+
+fn has_moved(from: Pose, to: Pose) -> bool {
+    (from.x, from.y) != (to.x, to.y)
+}
+
+/// The block that begins with a step.
+fn block(recording: &Recording, layout: Layout, first: usize) -> Vec<u8> {
+    let steps = BLOCK.min(layout.steps - first);
+    let mut bytes = Vec::new();
+    if layout.minds {
+        bytes.extend(per_step(layout, first, steps, |t, robot| {
+            move_code(recording, t, robot)
+        }));
+        let predicted = |t, robot| {
+            let bits = recording.predicted(t, robot);
+            bits.map_or([0; 2], |bits| bits.bits().to_le_bytes())
+        };
+        for byte in 0..layout.prediction_bytes {
+            bytes.extend(per_state(layout, first, steps, |t, robot| {
+                predicted(t, robot)[byte]
+            }));
+        }
+    } else {
+        for part in 0..5 {
+            bytes.extend(per_state(layout, first, steps, |t, robot| {
+                let pose = recording.poses(t)[robot];
+                let ([x0, x1], [y0, y1]) = (pose.x.to_le_bytes(), pose.y.to_le_bytes());
+                [x0, x1, y0, y1, pose.heading as u8][part]
+            }));
+        }
+    }
+    bytes.extend(per_state(layout, first, steps, |t, robot| {
+        recording.members[t][robot].bits()
+    }));
+    bytes
+}
+
+fn move_code(recording: &Recording, t: usize, robot: usize) -> u8 {
+    let decision = recording.trace.steps[t].decisions[robot];
+    let moved = has_moved(recording.poses(t)[robot], recording.poses(t + 1)[robot]);
+    decision.action as u8 | (decision.turn as u8) << 1 | u8::from(moved) << 2
+}
+
+/// A plane of steps.
+fn per_step(
+    layout: Layout,
+    first: usize,
+    steps: usize,
+    value: impl Fn(usize, usize) -> u8,
+) -> Vec<u8> {
+    let robots = 0..layout.robots;
+    let value = &value;
+    robots
+        .flat_map(|robot| (first..first + steps).map(move |t| value(t, robot)))
+        .collect()
+}
+
+/// A plane of states.
+fn per_state(
+    layout: Layout,
+    first: usize,
+    steps: usize,
+    value: impl Fn(usize, usize) -> u8,
+) -> Vec<u8> {
+    per_step(layout, first, steps + 1, |t, robot| {
+        let now = value(t, robot);
+        if t == first {
+            now
+        } else {
+            now ^ value(t - 1, robot)
+        }
+    })
+}

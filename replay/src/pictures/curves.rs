@@ -1,0 +1,252 @@
+//! A value over time, as in the paper's Figs. 5 and 6; plotters lays the axes out.
+
+use super::drawing::{Anchor, Drawing, Size, Stroke, channels, line};
+use super::{PictureError, named, words};
+use crate::palette::Theme;
+use crate::recording::Recording;
+use plotters::prelude::{
+    ChartBuilder, IntoDrawingArea, IntoFont, PathElement, RGBColor, ShapeStyle, TRANSPARENT,
+    TextStyle,
+};
+use plotters_backend::text_anchor::{HPos, VPos};
+use plotters_backend::{
+    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,
+    FontTransform,
+};
+use std::convert::Infallible;
+
+/// Height of a curve by its width.
+const SHAPE: f64 = 0.56;
+
+/// Plotters has whole coordinates: this many make a millimetre or a pixel.
+const FINE: f64 = 100.0;
+
+/// Width of a curve on a screen, in pixels.
+const SCREEN_WIDTH: f64 = 480.0;
+
+/// Temperature over the steps.
+pub(super) fn temperature(
+    recording: &Recording,
+    size: Size,
+    theme: &'static Theme,
+) -> Result<Drawing, PictureError> {
+    let most = recording.temperature.iter().copied().fold(0.0, f64::max);
+    let curve = Curve {
+        title: format!("temperature, {}", named(recording)),
+        x: "time step",
+        y: "temperature",
+        values: &recording.temperature,
+        range: (0.0, tenths(most, f64::ceil).max(0.1)),
+    };
+    curve.draw(size, theme)
+}
+
+/// Best fitness over the generations.
+pub(super) fn fitness(
+    recording: &Recording,
+    size: Size,
+    theme: &'static Theme,
+) -> Result<Drawing, PictureError> {
+    let values = &recording.origin.evolution;
+    if values.is_empty() {
+        return Err(PictureError::NoEvolution);
+    }
+    let least = values.iter().copied().fold(1.0, f64::min);
+    let most = values.iter().copied().fold(0.0, f64::max);
+    let least = tenths(least, f64::floor);
+    let curve = Curve {
+        title: format!("best fitness, {}", named(recording)),
+        x: "generation",
+        y: "best fitness",
+        values,
+        range: (least, tenths(most, f64::ceil).max(least + 0.1)),
+    };
+    curve.draw(size, theme)
+}
+
+fn tenths(value: f64, to: fn(f64) -> f64) -> f64 {
+    to(value * 10.0) / 10.0
+}
+
+struct Curve<'a> {
+    title: String,
+    x: &'static str,
+    y: &'static str,
+    values: &'a [f64],
+    range: (f64, f64),
+}
+
+impl Curve<'_> {
+    fn draw(&self, size: Size, theme: &'static Theme) -> Result<Drawing, PictureError> {
+        let width = match size {
+            Size::Paper(width) => width,
+            Size::Screen(_) => SCREEN_WIDTH,
+        };
+        let height = size.whole(width * SHAPE);
+        let mut drawing = Drawing::new(size, theme, &self.title);
+        drawing.set_size(width, height);
+        self.onto(&mut drawing, (width, height))
+            .map_err(|error| PictureError::Encoding(error.to_string()))?;
+        Ok(drawing)
+    }
+
+    fn onto(
+        &self,
+        drawing: &mut Drawing,
+        (width, height): (f64, f64),
+    ) -> Result<(), Box<dyn std::error::Error>> {
+        let theme = drawing.theme;
+        let size = drawing.size;
+        let fine = |length: f64| (length * FINE).round() as u32;
+        let words = size.words();
+        let [text, soft, line, curve] = [theme.text, theme.soft, theme.line, theme.named].map(rgb);
+        let area = Plot {
+            drawing,
+            size: (fine(width), fine(height)),
+        }
+        .into_drawing_area();
+        let font = ("sans-serif", f64::from(fine(words))).into_font();
+        let style = TextStyle::from(font);
+        let mut chart = ChartBuilder::on(&area)
+            .margin_top(fine(0.8 * words))
+            .margin_right(fine(1.2 * words))
+            .margin_bottom(fine(0.8 * words))
+            .margin_left(fine(0.3 * words))
+            .x_label_area_size(fine(3.0 * words))
+            .y_label_area_size(fine(4.2 * words))
+            .build_cartesian_2d(0..self.values.len(), self.range.0..self.range.1)?;
+        let hair = |colour: RGBColor, times: f64| {
+            ShapeStyle::from(&colour).stroke_width(fine(times * size.hair()))
+        };
+        chart
+            .configure_mesh()
+            .x_desc(self.x)
+            .y_desc(self.y)
+            .x_labels(6)
+            .y_labels(6)
+            .set_all_tick_mark_size(fine(0.4 * words))
+            .y_label_formatter(&|value| format!("{value:.1}"))
+            .label_style(style.color(&soft))
+            .axis_desc_style(style.color(&text))
+            .axis_style(hair(soft, 1.5))
+            .bold_line_style(hair(line, 1.0))
+            .light_line_style(TRANSPARENT)
+            .draw()?;
+        let points: Vec<_> = self.values.iter().copied().enumerate().collect();
+        chart.draw_series([PathElement::new(points, hair(curve, 2.0))])?;
+        area.present()?;
+        Ok(())
+    }
+}
+
+/// A drawing that plotters draws on.
+struct Plot<'a> {
+    drawing: &'a mut Drawing,
+    size: (u32, u32),
+}
+
+impl Plot<'_> {
+    fn at(&self, (x, y): BackendCoord) -> (f64, f64) {
+        (f64::from(x) / FINE, f64::from(y) / FINE)
+    }
+
+    fn points(&mut self, points: &[BackendCoord], style: &impl BackendStyle) {
+        if style.color().alpha > 0.0 {
+            let points: Vec<(f64, f64)> = points.iter().map(|&point| self.at(point)).collect();
+            let colour = hexadecimal(style.color());
+            let stroke = Stroke {
+                colour: &colour,
+                width: f64::from(style.stroke_width()) / FINE,
+            };
+            self.drawing.stroked(line(&points), stroke);
+        }
+    }
+}
+
+type Drawn = Result<(), DrawingErrorKind<Infallible>>;
+
+/// Lines and words are all that curves are made of.
+impl DrawingBackend for Plot<'_> {
+    type ErrorType = Infallible;
+
+    fn get_size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    fn ensure_prepared(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn present(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn draw_pixel(&mut self, at: BackendCoord, colour: BackendColor) -> Drawn {
+        self.points(&[at, (at.0 + 1, at.1)], &colour);
+        Ok(())
+    }
+
+    fn draw_line<S: BackendStyle>(
+        &mut self,
+        from: BackendCoord,
+        to: BackendCoord,
+        style: &S,
+    ) -> Drawn {
+        self.points(&[from, to], style);
+        Ok(())
+    }
+
+    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        path: I,
+        style: &S,
+    ) -> Drawn {
+        self.points(&path.into_iter().collect::<Vec<_>>(), style);
+        Ok(())
+    }
+
+    fn draw_text<S: BackendTextStyle>(&mut self, text: &str, style: &S, at: BackendCoord) -> Drawn {
+        let (x, y) = self.at(at);
+        let colour = hexadecimal(style.color());
+        let height = words::CAPITALS * self.drawing.size.words();
+        // Of the capitals, from the anchor.
+        let down = match style.anchor().v_pos {
+            VPos::Top => height / 2.0,
+            VPos::Center => 0.0,
+            VPos::Bottom => -height / 2.0,
+        };
+        match style.transform() {
+            FontTransform::None => {
+                let anchor = match style.anchor().h_pos {
+                    HPos::Left => Anchor::Start,
+                    HPos::Center => Anchor::Middle,
+                    HPos::Right => Anchor::End,
+                };
+                self.drawing.words(text, anchor, (x, y + down), &colour);
+            }
+            // The name of the upright axis, by its middle.
+            _ => self.drawing.words_upwards(text, (x + down, y), &colour),
+        }
+        Ok(())
+    }
+
+    fn estimate_text_size<S: BackendTextStyle>(
+        &self,
+        text: &str,
+        _: &S,
+    ) -> Result<(u32, u32), DrawingErrorKind<Infallible>> {
+        let size = self.drawing.size.words();
+        let fine = |length: f64| (length * FINE).round() as u32;
+        Ok((fine(words::width(text, size)), fine(words::CAPITALS * size)))
+    }
+}
+
+fn rgb(colour: &str) -> RGBColor {
+    let [red, green, blue] = channels(colour);
+    RGBColor(red, green, blue)
+}
+
+fn hexadecimal(colour: BackendColor) -> String {
+    let (red, green, blue) = colour.rgb;
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}

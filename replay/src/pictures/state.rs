@@ -1,0 +1,321 @@
+//! A swarm, or two side by side: every robot an arrow in its cell, with what is marked on cells.
+
+use super::drawing::{Anchor, Drawing, Size, Stroke, line};
+use super::legend::Legend;
+use super::symbols::{area_stroke, arrow, set_off, square};
+use super::{Look, PictureError, named, symbols, words};
+use crate::recording::Recording;
+use crate::scene::{Colouring, Ink, Scene};
+use minimal_surprise_sim::damage::Damage;
+use svg::node::element::path::Data;
+
+/// A swarm in a picture.
+struct Panel {
+    scene: Scene,
+    left: Caption,
+    right: Caption,
+}
+
+/// Words over a swarm.
+struct Caption {
+    words: String,
+    /// The longest they get while the run goes on: what room is made for.
+    longest: String,
+}
+
+impl Caption {
+    fn unchanging(words: String) -> Self {
+        Self {
+            longest: words.clone(),
+            words,
+        }
+    }
+
+    fn of_members(recording: &Recording, members: usize) -> Self {
+        let robots = recording.robots();
+        match recording.name() {
+            None => Self::unchanging(named(recording)),
+            Some(name) => Self {
+                words: format!("{name}: {members} of {robots} robots"),
+                longest: format!("{name}: {robots} of {robots} robots"),
+            },
+        }
+    }
+
+    fn width(&self, size: Size) -> f64 {
+        let of = |text: &str| words::width(text, size.words());
+        of(&self.words).max(of(&self.longest))
+    }
+}
+
+/// State `t`.
+pub(super) fn state(recording: &Recording, t: usize, look: &Look) -> Result<Drawing, PictureError> {
+    let scene = scene(recording, t, look)?;
+    let legend = Legend::of([&scene], look.colouring, recording);
+    of_state(recording, t, look, scene, &legend)
+}
+
+/// State `t` as one of many, whose legend and size are the same.
+pub(super) fn frame(recording: &Recording, t: usize, look: &Look) -> Result<Drawing, PictureError> {
+    let scene = scene(recording, t, look)?;
+    let legend = Legend::whole(recording, look);
+    of_state(recording, t, look, scene, &legend)
+}
+
+fn of_state(
+    recording: &Recording,
+    t: usize,
+    look: &Look,
+    scene: Scene,
+    legend: &Legend,
+) -> Result<Drawing, PictureError> {
+    let steps = recording.steps();
+    let panel = Panel {
+        scene,
+        left: Caption::of_members(recording, recording.in_structure(t)),
+        right: Caption {
+            words: format!("step {t} of {steps}"),
+            longest: format!("step {steps} of {steps}"),
+        },
+    };
+    let title = format!("{}, {}", panel.left.words, panel.right.words);
+    panels(&title, &[panel], legend, look)
+}
+
+/// Before the damage, and state `t` after it.
+pub(super) fn damage(
+    recording: &Recording,
+    t: usize,
+    look: &Look,
+) -> Result<Drawing, PictureError> {
+    let damaged = recording
+        .origin
+        .damage
+        .as_ref()
+        .ok_or(PictureError::NoDamage)?;
+    let scenes = [
+        Scene::of_poses(recording, &damaged.before, look.colouring),
+        scene(recording, t, look)?,
+    ];
+    let legend = Legend::of(&scenes, look.colouring, recording);
+    let [before, after] = scenes;
+    let what = match damaged.damage {
+        Damage::Remove(_) => "removal",
+        Damage::Reposition(_) => "repositioning",
+    };
+    let panels = [
+        (before, format!("before the {what}")),
+        (after, format!("{t} steps after")),
+    ];
+    let panels = panels.map(|(scene, when)| {
+        let members = scene.robots.iter().filter(|robot| robot.ink == Ink::Named);
+        let (members, robots) = (members.count(), scene.robots.len());
+        let count = match (look.colouring, recording.name()) {
+            (Colouring::Structure, Some(name)) => format!("{name} {members} of {robots}"),
+            _ => format!("{robots} robots"),
+        };
+        Panel {
+            scene,
+            left: Caption::unchanging(when),
+            right: Caption::unchanging(count),
+        }
+    });
+    let title = format!("{}; {}", panels[0].left.words, panels[1].left.words);
+    self::panels(&title, &panels, &legend, look)
+}
+
+fn scene(recording: &Recording, t: usize, look: &Look) -> Result<Scene, PictureError> {
+    let robots = recording.robots();
+    if let Some(asked) = look.robot.filter(|&robot| robot >= robots) {
+        return Err(PictureError::NoRobot {
+            asked,
+            last: robots.saturating_sub(1),
+        });
+    }
+    if recording.minds.is_none() && (look.robot.is_some() || look.colouring == Colouring::Surprise)
+    {
+        return Err(PictureError::NoMinds);
+    }
+    Ok(Scene::of(recording, t, look.colouring, look.robot))
+}
+
+/// Width of a panel and side of a cell: on a screen the cells say how large a picture gets, on
+/// paper its width how large they get.
+fn layout(
+    panels: &[Panel],
+    legend: &Legend,
+    size: Size,
+    gap: f64,
+) -> Result<(f64, f64), PictureError> {
+    let count = panels.len() as f64;
+    let (columns, rows) = cells(panels);
+    let captions = panels.iter().flat_map(|panel| [&panel.left, &panel.right]);
+    let widest = captions.map(|caption| caption.width(size));
+    let widest = widest.fold(0.0, f64::max);
+    match size {
+        Size::Paper(width) => {
+            let between = gap * (count - 1.0);
+            // Between panels, words may reach into the gap.
+            let captions = count * widest + between / 2.0;
+            let needed = captions.max(legend.widest(size)) + 2.0 * size.margin();
+            if needed > width {
+                let needed = needed.ceil() as u32;
+                return Err(PictureError::TooNarrow { needed });
+            }
+            let panel = (width - 2.0 * size.margin() - between) / count;
+            Ok((panel, panel / columns.max(rows)))
+        }
+        Size::Screen(side) => {
+            let side = f64::from(side);
+            let words = widest.max(legend.widest(size));
+            // A pixel more, for the line at the end.
+            Ok((size.whole((columns * side + 1.0).max(words)), side))
+        }
+    }
+}
+
+/// Cells of the widest and of the highest panel.
+fn cells(panels: &[Panel]) -> (f64, f64) {
+    let most = |of: fn(&Scene) -> u16| {
+        let sides = panels.iter().map(|panel| f64::from(of(&panel.scene)));
+        sides.fold(1.0, f64::max)
+    };
+    (most(|scene| scene.width), most(|scene| scene.height))
+}
+
+fn panels(
+    title: &str,
+    panels: &[Panel],
+    legend: &Legend,
+    look: &Look,
+) -> Result<Drawing, PictureError> {
+    let size = look.size;
+    let (words, margin) = (size.words(), size.margin());
+    let gap = size.whole(1.5 * words);
+    let count = panels.len() as f64;
+    let (panel, side) = layout(panels, legend, size, gap)?;
+    let (columns, rows) = cells(panels);
+    let width = panel * count + gap * (count - 1.0) + 2.0 * margin;
+    let line_height = size.whole(1.5 * words);
+    let one_line = panels
+        .iter()
+        .all(|of| of.left.width(size) + of.right.width(size) + 1.5 * words <= panel);
+    let header = margin + line_height * if one_line { 1.0 } else { 2.0 };
+    // A line of one pixel is sharp in the middle of pixels.
+    let half = match size {
+        Size::Paper(_) => 0.0,
+        Size::Screen(_) => 0.5,
+    };
+    let mut drawing = Drawing::new(size, look.theme, title);
+    for (index, of) in panels.iter().enumerate() {
+        let west = margin + (panel + gap) * index as f64;
+        let first = margin + line_height * 0.4;
+        drawing.words(
+            &of.left.words,
+            Anchor::Start,
+            (west, first),
+            look.theme.text,
+        );
+        let (anchor, at) = if one_line {
+            (Anchor::End, (west + panel, first))
+        } else {
+            (Anchor::Start, (west, first + line_height))
+        };
+        drawing.words(&of.right.words, anchor, at, look.theme.soft);
+        let inside = panel - columns * side;
+        let corner = (west + size.floor(inside / 2.0) + half, header + half);
+        swarm(&mut drawing, &of.scene, corner, side);
+    }
+    let below = header + size.whole(rows * side) + 1.1 * words;
+    let last = legend.draw(&mut drawing, (margin, below), width - 2.0 * margin);
+    drawing.set_size(width, size.whole(last + margin));
+    Ok(drawing)
+}
+
+fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f64), side: f64) {
+    let theme = drawing.theme;
+    let hair = drawing.size.hair();
+    let (width, height) = (f64::from(scene.width), f64::from(scene.height));
+    let (east, south) = (west + width * side, north + height * side);
+    drawing.area((west, north), (east - west, south - north), theme.cell);
+    // The page counts rows from the south, pictures from the north.
+    let corner = |x: u16, y: u16| {
+        (
+            west + f64::from(x) * side,
+            south - (f64::from(y) + 1.0) * side,
+        )
+    };
+    let mut grid = Data::new();
+    let upright = (0..=scene.width).map(|x| {
+        let x = west + f64::from(x) * side;
+        [(x, north), (x, south)]
+    });
+    let level = (0..=scene.height).map(|y| {
+        let y = north + f64::from(y) * side;
+        [(west, y), (east, y)]
+    });
+    for ends in upright.chain(level) {
+        for command in line(&ends).iter() {
+            grid.append(command.clone());
+        }
+    }
+    let thin = Stroke {
+        colour: theme.line,
+        width: hair,
+    };
+    drawing.stroked(grid, thin);
+    for mark in &scene.marks {
+        symbols::mark(drawing, mark.mark, corner(mark.x, mark.y), side);
+    }
+    for robot in &scene.robots {
+        let at = corner(robot.x, robot.y);
+        if scene
+            .marks
+            .iter()
+            .any(|mark| (mark.x, mark.y) == (robot.x, robot.y))
+        {
+            set_off(drawing, at, side, robot.heading);
+        }
+        arrow(drawing, at, side, robot.heading, robot.ink);
+    }
+    if let Some(robot) = scene.picked.and_then(|robot| scene.robots.get(robot)) {
+        let frame = square(corner(robot.x, robot.y), side, 0.0);
+        let stroke = Stroke {
+            colour: theme.text,
+            width: (0.09 * side).max(1.5 * hair),
+        };
+        drawing.stroked(frame, stroke);
+    }
+    area(drawing, scene, corner, side);
+}
+
+/// The outline of the damaged cells; where they go on across the edge it is open.
+fn area(drawing: &mut Drawing, scene: &Scene, corner: impl Fn(u16, u16) -> (f64, f64), side: f64) {
+    let is_inside = |x: u16, y: u16| scene.area.contains(&[x % scene.width, y % scene.height]);
+    let mut outline = Data::new();
+    for &[x, y] in &scene.area {
+        let (west, north) = corner(x, y);
+        let (east, south) = (west + side, north + side);
+        let sides = [
+            (is_inside(x + 1, y), [(east, north), (east, south)]),
+            (is_inside(x, y + 1), [(west, north), (east, north)]),
+            (
+                is_inside(x + scene.width - 1, y),
+                [(west, north), (west, south)],
+            ),
+            (
+                is_inside(x, y + scene.height - 1),
+                [(west, south), (east, south)],
+            ),
+        ];
+        for (_, ends) in sides.iter().filter(|(goes_on, _)| !goes_on) {
+            for command in line(ends).iter() {
+                outline.append(command.clone());
+            }
+        }
+    }
+    if !scene.area.is_empty() {
+        let stroke = area_stroke(drawing, side);
+        drawing.stroked(outline, stroke);
+    }
+}

@@ -1,0 +1,316 @@
+//! What there is to see of a run: every state, and what the robots sensed, did and expected.
+//!
+//! State `t` is the swarm after `t` steps, `t` = 0 to T. In step `t`, from state `t` to `t + 1`,
+//! every robot takes a reading, which its prediction of the step before is compared with, then
+//! acts and predicts the next reading.
+
+use minimal_surprise_controller::{Controller, Genome, SensorBits, State, Topology};
+use minimal_surprise_evolution::finished_run::FinishedRun;
+use minimal_surprise_evolution::settings::Settings;
+use minimal_surprise_evolution::steps_hash::{RecordedHash, StepsHash, Version};
+use minimal_surprise_sim::damage::{Damage, DamageError};
+use minimal_surprise_sim::evaluation::run;
+use minimal_surprise_sim::exchange::Trajectory;
+use minimal_surprise_sim::metrics::Measures;
+use minimal_surprise_sim::noise::NoiseStream;
+use minimal_surprise_sim::structures::{Membership, Structure, classify};
+use minimal_surprise_sim::{Area, Grid, Pose, Scenario, Trace, TraceStep, Trial, WorldError};
+use rayon::prelude::*;
+
+/// A run to look at.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// The torus.
+    pub grid: Grid,
+    /// Every step, and the final poses. A trajectory has no readings and no decisions.
+    pub trace: Trace,
+    /// What the robots are; nothing is known of those of a trajectory.
+    pub minds: Option<Minds>,
+    /// For every state and robot, the structures that it belongs to.
+    pub members: Vec<Vec<Membership>>,
+    /// The structures that the run is named after, those of its final state, or of the state before
+    /// it was damaged; several if tied.
+    pub names: Vec<Structure>,
+    /// Temperature of every step, 0 to 1 (paper, Eqs. 2–3).
+    pub temperature: Vec<f64>,
+    /// The hash of the steps, made from this recording.
+    pub steps_hash: Option<StepsHash>,
+    /// Where it comes from.
+    pub origin: Origin,
+}
+
+/// What robots sense with and expect.
+#[derive(Clone, Debug)]
+pub struct Minds {
+    /// Sensor model and fixed predictions.
+    pub topology: Topology,
+    /// What every robot's first reading is compared with.
+    pub first_prediction: SensorBits,
+    /// What flips readings.
+    pub noise: NoiseStream,
+    /// Fitness after every step, 0 to 1 (paper, Eq. 1, over the steps so far).
+    pub fitness: Vec<f64>,
+    /// Average prediction of every sensor over the run, 0 to 1.
+    pub average_prediction: Vec<f64>,
+}
+
+/// Where a recording comes from.
+#[derive(Clone, Debug, Default)]
+pub struct Origin {
+    /// Its name: a file or directory as the user gave it.
+    pub name: String,
+    /// Seed of the evolution.
+    pub seed: Option<u64>,
+    /// Hash of the evolution.
+    pub run_hash: Option<String>,
+    /// The hash of the steps that the run recorded, for comparison.
+    pub steps_hash: Option<RecordedHash>,
+    /// Sensor noise: the probability that a bit is flipped.
+    pub noise: f64,
+    /// Best fitness of every generation of the evolution; empty if it is not known.
+    pub evolution: Vec<f64>,
+    /// If the swarm was damaged at the start: where, and how it stood before.
+    pub damage: Option<Damaged>,
+}
+
+/// A swarm that was damaged before the first step.
+#[derive(Clone, Debug)]
+pub struct Damaged {
+    /// What was done, and where.
+    pub damage: Damage,
+    /// Poses before the damage.
+    pub before: Vec<Pose>,
+}
+
+impl Recording {
+    /// The final run of an evolution.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the starting poses do not fit the grid.
+    pub fn of_run(
+        name: &str,
+        finished: &FinishedRun,
+        after_step: &dyn Fn(),
+    ) -> Result<Self, WorldError> {
+        let origin = Origin {
+            steps_hash: finished.steps_hash.clone(),
+            ..origin(name, finished)
+        };
+        let scenario = finished.settings.scenario();
+        Self::of_trial(
+            &finished.genome,
+            scenario,
+            &finished.trial(),
+            origin,
+            after_step,
+        )
+    }
+
+    /// The final state of an evolution damaged, and what becomes of it.
+    ///
+    /// # Errors
+    /// [`DamageError`] if nothing is left to run.
+    pub fn of_damage(
+        name: &str,
+        finished: &FinishedRun,
+        damage: Damage,
+        after_step: &dyn Fn(),
+    ) -> Result<Self, DamageError> {
+        let settings: &Settings = &finished.settings;
+        let seeds = minimal_surprise_sim::SeedTree::new(settings.seed());
+        let before = finished.final_poses.clone();
+        let (scenario, trial) = damage.trial(settings.scenario(), &before, seeds, 0)?;
+        let origin = Origin {
+            damage: Some(Damaged { damage, before }),
+            ..origin(name, finished)
+        };
+        let names = classify(scenario.grid(), &finished.final_poses)?.names();
+        let recording = Self::of_trial(&finished.genome, &scenario, &trial, origin, after_step)?;
+        Ok(Self { names, ..recording })
+    }
+
+    /// A genome under some conditions.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the starting poses do not fit the grid.
+    pub fn of_trial(
+        genome: &Genome,
+        scenario: &Scenario,
+        trial: &Trial,
+        origin: Origin,
+        after_step: &dyn Fn(),
+    ) -> Result<Self, WorldError> {
+        let controller = Controller::new(genome);
+        let grid = scenario.grid();
+        let topology = controller.topology();
+        let mut measures = Measures::starting_from(grid, topology, &trial.starts);
+        let recorded = origin.steps_hash.as_ref();
+        let version = recorded.map_or_else(Version::default, |recorded| recorded.version);
+        let mut hash = StepsHash::new(version, trial, topology.model());
+        let mut fitness = Vec::new();
+        let mut trace = Trace {
+            steps: Vec::new(),
+            final_poses: trial.starts.clone(),
+        };
+        run(&controller, scenario, trial, |world| {
+            after_step();
+            trace.record(world);
+            hash.observe(world);
+            measures.observe(world);
+            fitness.push(measures.fitness());
+        })?;
+        let minds = Minds {
+            topology,
+            noise: trial.noise.clone(),
+            first_prediction: State::new(&controller).prediction(),
+            fitness,
+            average_prediction: measures.average_prediction(),
+        };
+        let temperature = measures.temperature();
+        let recording = Self::of_trace(grid, trace, temperature, origin)?;
+        Ok(Self {
+            minds: Some(minds),
+            steps_hash: Some(hash),
+            ..recording
+        })
+    }
+
+    /// Poses only, from another program.
+    ///
+    /// # Errors
+    /// [`WorldError`] if poses do not fit the grid.
+    pub fn of_trajectory(name: &str, trajectory: &Trajectory) -> Result<Self, WorldError> {
+        let grid = trajectory.grid();
+        let states = trajectory.states();
+        let steps = states[..states.len().saturating_sub(1)].iter();
+        let trace = Trace {
+            steps: steps
+                .map(|poses| TraceStep {
+                    poses: poses.clone(),
+                    readings: Vec::new(),
+                    decisions: Vec::new(),
+                })
+                .collect(),
+            final_poses: trajectory.final_poses().to_vec(),
+        };
+        let temperature = states.windows(2).map(|pair| {
+            let moved = pair[0].iter().zip(&pair[1]);
+            let moved = moved.filter(|(a, b)| (a.x, a.y) != (b.x, b.y)).count();
+            moved as f64 / pair[0].len().max(1) as f64
+        });
+        let origin = Origin {
+            name: name.to_owned(),
+            ..Origin::default()
+        };
+        let temperature = temperature.collect();
+        Self::of_trace(grid, trace, temperature, origin)
+    }
+
+    fn of_trace(
+        grid: Grid,
+        trace: Trace,
+        temperature: Vec<f64>,
+        origin: Origin,
+    ) -> Result<Self, WorldError> {
+        let last = [&trace.final_poses];
+        let states: Vec<&Vec<Pose>> = trace.steps.iter().map(|s| &s.poses).chain(last).collect();
+        let members = states
+            .par_iter()
+            .map(|poses| classify(grid, poses).map(|found| found.memberships()))
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            names: classify(grid, &trace.final_poses)?.names(),
+            grid,
+            trace,
+            minds: None,
+            members,
+            temperature,
+            steps_hash: None,
+            origin,
+        })
+    }
+
+    /// Number of steps, T; there is one state more.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        self.trace.steps.len()
+    }
+
+    /// Number of robots.
+    #[must_use]
+    pub fn robots(&self) -> usize {
+        self.trace.final_poses.len()
+    }
+
+    /// Poses of state `t`; the final ones beyond the last.
+    #[must_use]
+    pub fn poses(&self, t: usize) -> &[Pose] {
+        self.trace
+            .steps
+            .get(t)
+            .map_or(&self.trace.final_poses, |step| &step.poses)
+    }
+
+    /// What a robot sensed in step `t`, noise included; none in the last state and of a trajectory.
+    #[must_use]
+    pub fn sensed(&self, t: usize, robot: usize) -> Option<SensorBits> {
+        self.trace.steps.get(t)?.readings.get(robot).copied()
+    }
+
+    /// What a robot expects to sense in state `t`; none of a trajectory.
+    #[must_use]
+    pub fn predicted(&self, t: usize, robot: usize) -> Option<SensorBits> {
+        match t.checked_sub(1) {
+            None => self.minds.as_ref().map(|minds| minds.first_prediction),
+            Some(before) => {
+                let step = self.trace.steps.get(before)?;
+                step.decisions.get(robot).map(|d| d.prediction)
+            }
+        }
+    }
+
+    /// Whether a robot belongs to a structure in state `t`.
+    #[must_use]
+    pub fn is_member(&self, t: usize, robot: usize, structure: Structure) -> bool {
+        let members = self.members.get(t).and_then(|robots| robots.get(robot));
+        members.is_some_and(|members| members.contains(structure))
+    }
+
+    /// The structure that the run is named after, of tied ones the first in the paper's
+    /// order.
+    #[must_use]
+    pub fn name(&self) -> Option<Structure> {
+        self.names.first().copied()
+    }
+
+    /// Robots in the structure that the run is named after, in state `t`.
+    #[must_use]
+    pub fn in_structure(&self, t: usize) -> usize {
+        self.name().map_or(0, |name| {
+            let robots = 0..self.robots();
+            robots
+                .filter(|&robot| self.is_member(t, robot, name))
+                .count()
+        })
+    }
+
+    /// The area that was damaged.
+    #[must_use]
+    pub fn damaged_area(&self) -> Option<Area> {
+        self.origin.damage.as_ref().map(|damaged| {
+            let (Damage::Remove(area) | Damage::Reposition(area)) = damaged.damage;
+            area
+        })
+    }
+}
+
+fn origin(name: &str, finished: &FinishedRun) -> Origin {
+    Origin {
+        name: name.to_owned(),
+        seed: Some(finished.settings.seed()),
+        run_hash: Some(finished.hash.clone()),
+        noise: finished.settings.noise(),
+        evolution: finished.best_fitness.clone(),
+        ..Origin::default()
+    }
+}

@@ -1,0 +1,216 @@
+//! One state of a run as something to draw: which robots stand where, in which ink, and what is
+//! marked on the cells. Every back end draws scenes and knows nothing else of a run; the page has
+//! this file's rules once more in its script, and a test compares the two.
+
+use super::recording::Recording;
+use minimal_surprise_controller::SensorBits;
+use minimal_surprise_sim::structures::classify;
+use minimal_surprise_sim::{Pose, Structure};
+use serde::Serialize;
+
+/// What the colours of robots say.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[serde(rename_all = "kebab-case")]
+pub enum Colouring {
+    /// Whether a robot belongs to the structure that the run is named after, or to another one.
+    #[default]
+    Structure,
+    /// How many of its sensors a robot mispredicted.
+    Surprise,
+    /// Nothing.
+    Plain,
+}
+
+/// A state to draw.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Scene {
+    /// Cells in a row.
+    pub width: u16,
+    /// Rows.
+    pub height: u16,
+    /// The robots, in index order.
+    pub robots: Vec<Robot>,
+    /// What is marked on cells: the sensor cells of the robot that is looked into.
+    pub marks: Vec<MarkedCell>,
+    /// Cells of the area that was damaged.
+    pub area: Vec<[u16; 2]>,
+    /// The robot that is looked into.
+    pub picked: Option<usize>,
+}
+
+/// A robot to draw: an arrow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Robot {
+    /// Cells from the west edge.
+    pub x: u16,
+    /// Cells from the south edge.
+    pub y: u16,
+    /// 0 east, 1 north, 2 west, 3 south.
+    pub heading: u8,
+    /// Its colour and shape.
+    pub ink: Ink,
+}
+
+/// What a robot's colour and shape say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ink {
+    /// Nothing.
+    Plain,
+    /// It belongs to the structure that the run is named after.
+    Named,
+    /// It belongs to another structure.
+    Other,
+    /// It belongs to none: drawn hollow.
+    Outside,
+    /// It mispredicted so few of its sensors: none; up to an eighth; up to a quarter; more.
+    Surprise(u8),
+}
+
+/// A marked cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct MarkedCell {
+    /// Cells from the west edge.
+    pub x: u16,
+    /// Cells from the south edge.
+    pub y: u16,
+    /// What was sensed and predicted there.
+    pub mark: Mark,
+}
+
+/// What a robot sensed and predicted of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mark {
+    /// Sensed a robot and had predicted one.
+    HitOccupied,
+    /// Sensed none and had predicted none.
+    HitEmpty,
+    /// Sensed a robot and had predicted none.
+    MissOccupied,
+    /// Sensed none and had predicted one.
+    MissEmpty,
+    /// Predicts a robot; the run ends before it looks.
+    ExpectsOccupied,
+    /// Predicts none; the run ends before it looks.
+    ExpectsEmpty,
+}
+
+impl Scene {
+    /// State `t` of a recording.
+    #[must_use]
+    pub fn of(
+        recording: &Recording,
+        t: usize,
+        colouring: Colouring,
+        picked: Option<usize>,
+    ) -> Self {
+        let grid = recording.grid;
+        let picked = picked.filter(|&robot| robot < recording.robots());
+        let robots = recording.poses(t).iter().enumerate();
+        let robots =
+            robots.map(|(robot, &pose)| robot_at(pose, ink(recording, t, robot, colouring)));
+        let area = recording.damaged_area().map_or_else(Vec::new, |area| {
+            let cells = (0..grid.height()).flat_map(|y| (0..grid.width()).map(move |x| [x, y]));
+            cells.filter(|&[x, y]| area.contains(x, y)).collect()
+        });
+        Self {
+            width: grid.width(),
+            height: grid.height(),
+            robots: robots.collect(),
+            marks: picked.map_or_else(Vec::new, |robot| marks(recording, t, robot)),
+            area,
+            picked,
+        }
+    }
+
+    /// A swarm of which only the poses are known, as before damage. Its robots are coloured by
+    /// structure if they are at all.
+    #[must_use]
+    pub fn of_poses(recording: &Recording, poses: &[Pose], colouring: Colouring) -> Self {
+        let members = match colouring {
+            Colouring::Structure => classify(recording.grid, poses)
+                .map(|found| found.memberships())
+                .unwrap_or_default(),
+            Colouring::Surprise | Colouring::Plain => Vec::new(),
+        };
+        let robots = poses.iter().enumerate();
+        let robots = robots.map(|(robot, &pose)| {
+            let ink = members.get(robot).map_or(Ink::Plain, |members| {
+                ink_of_member(|s| members.contains(s), recording.name())
+            });
+            robot_at(pose, ink)
+        });
+        Self {
+            robots: robots.collect(),
+            ..Self::of(recording, 0, Colouring::Plain, None)
+        }
+    }
+}
+
+fn robot_at(pose: Pose, ink: Ink) -> Robot {
+    Robot {
+        x: pose.x,
+        y: pose.y,
+        heading: pose.heading as u8,
+        ink,
+    }
+}
+
+fn ink(recording: &Recording, t: usize, robot: usize, colouring: Colouring) -> Ink {
+    match colouring {
+        Colouring::Plain => Ink::Plain,
+        Colouring::Structure => {
+            ink_of_member(|s| recording.is_member(t, robot, s), recording.name())
+        }
+        Colouring::Surprise => surprise(recording, t, robot).map_or(Ink::Plain, Ink::Surprise),
+    }
+}
+
+fn ink_of_member(is_member: impl Fn(Structure) -> bool, name: Option<Structure>) -> Ink {
+    if name.is_some_and(&is_member) {
+        Ink::Named
+    } else if Structure::ALL.into_iter().any(is_member) {
+        Ink::Other
+    } else {
+        Ink::Outside
+    }
+}
+
+/// How surprised a robot is in state `t`, in four levels; none where nothing was sensed.
+fn surprise(recording: &Recording, t: usize, robot: usize) -> Option<u8> {
+    let sensors = recording.minds.as_ref()?.topology.sensors() as u32;
+    let sensed = recording.sensed(t, robot)?;
+    let missed = sensed.differing(recording.predicted(t, robot)?);
+    Some(match missed {
+        0 => 0,
+        few if 8 * few <= sensors => 1,
+        some if 4 * some <= sensors => 2,
+        _ => 3,
+    })
+}
+
+fn marks(recording: &Recording, t: usize, robot: usize) -> Vec<MarkedCell> {
+    let (Some(minds), Some(&pose)) = (&recording.minds, recording.poses(t).get(robot)) else {
+        return Vec::new();
+    };
+    let sensed = recording.sensed(t, robot);
+    let predicted = recording.predicted(t, robot).unwrap_or(SensorBits::NONE);
+    let cells = minds.topology.model().cells().iter().enumerate();
+    cells
+        .map(|(sensor, &cell)| {
+            let (dx, dy) = pose.heading.offset(cell);
+            let (x, y) = recording.grid.moved(pose.x, pose.y, dx, dy);
+            let mark = match (sensed.map(|bits| bits.get(sensor)), predicted.get(sensor)) {
+                (Some(true), true) => Mark::HitOccupied,
+                (Some(false), false) => Mark::HitEmpty,
+                (Some(true), false) => Mark::MissOccupied,
+                (Some(false), true) => Mark::MissEmpty,
+                (None, true) => Mark::ExpectsOccupied,
+                (None, false) => Mark::ExpectsEmpty,
+            };
+            MarkedCell { x, y, mark }
+        })
+        .collect()
+}

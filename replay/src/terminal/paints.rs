@@ -1,0 +1,122 @@
+//! Colours for terminals whose ground nobody knows: readable on light and on dark, in as many
+//! colours as the terminal has.
+
+use crate::palette::{LIGHT, Theme};
+use crate::scene::{Ink, Mark};
+use anstyle::RgbColor;
+use ratatui::style::{Color, Modifier, Style};
+
+/// The hues for light ground are dark enough for it and light enough for black; where the theme is
+/// grey, the terminal's own colour of words is taken instead.
+const HUES: Theme = LIGHT;
+
+/// How many colours a terminal has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Paints {
+    /// None, or none are wanted.
+    None,
+    /// The sixteen whose look is the user's affair.
+    Sixteen,
+    /// 256 known ones.
+    Indexed,
+    /// All.
+    True,
+}
+
+impl Paints {
+    fn paint(self, hue: &str, of_sixteen: Color) -> Style {
+        let colour = match (self, hue.parse()) {
+            (Self::None, _) => return Style::new(),
+            (Self::Indexed, Ok(Color::Rgb(r, g, b))) => {
+                Color::Indexed(anstyle_lossy::rgb_to_xterm(RgbColor(r, g, b)).0)
+            }
+            (Self::True, Ok(colour)) => colour,
+            _ => of_sixteen,
+        };
+        Style::new().fg(colour)
+    }
+
+    /// The hue of the named structure.
+    #[must_use]
+    pub fn named(self) -> Style {
+        self.paint(HUES.named, Color::Cyan)
+    }
+
+    /// The hue of other structures.
+    #[must_use]
+    pub fn other(self) -> Style {
+        self.paint(HUES.other, Color::Yellow)
+    }
+
+    /// The hue of what was predicted right.
+    #[must_use]
+    pub fn hit(self) -> Style {
+        self.paint(HUES.hit, Color::Green)
+    }
+
+    /// How robots look.
+    #[must_use]
+    pub fn ink(self, ink: Ink) -> Style {
+        match ink {
+            Ink::Plain | Ink::Surprise(0) => Style::new(),
+            Ink::Outside => soft(),
+            Ink::Named => self.named().bold(),
+            Ink::Other => self.other(),
+            Ink::Surprise(1) => self.paint(HUES.surprise[1], Color::Cyan),
+            Ink::Surprise(2) => self.paint(HUES.surprise[2], Color::Yellow),
+            Ink::Surprise(_) => self.paint(HUES.surprise[3], Color::Red).bold(),
+        }
+    }
+
+    /// How marks look.
+    #[must_use]
+    pub fn mark(self, mark: Mark) -> Style {
+        let of_sixteen = match mark {
+            Mark::HitOccupied | Mark::HitEmpty => Color::Green,
+            Mark::MissOccupied | Mark::MissEmpty => Color::Red,
+            Mark::ExpectsOccupied | Mark::ExpectsEmpty => Color::Magenta,
+        };
+        self.paint(HUES.mark(mark), of_sixteen).bold()
+    }
+
+    /// How the area that was damaged looks.
+    #[must_use]
+    pub fn area(self) -> Style {
+        self.paint(HUES.expects, Color::Magenta)
+    }
+
+    /// How what needs attention looks.
+    #[must_use]
+    pub fn warning(self) -> Style {
+        self.paint(HUES.miss, Color::Red).bold()
+    }
+}
+
+/// How what matters less looks.
+#[must_use]
+pub fn soft() -> Style {
+    Style::new().add_modifier(Modifier::DIM)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inks_and_marks_stay_apart_in_few_colours_and_have_none_where_none_are_wanted() {
+        for paints in [Paints::Sixteen, Paints::Indexed, Paints::True] {
+            let inks = [
+                paints.named(),
+                paints.other(),
+                paints.warning(),
+                paints.hit(),
+            ];
+            for (index, ink) in inks.iter().enumerate() {
+                assert!(ink.fg.is_some(), "{paints:?}");
+                assert!(!inks[..index].contains(ink), "{paints:?}: {ink:?}");
+            }
+        }
+        assert_eq!(Paints::None.named(), Style::new());
+        assert_eq!(Paints::None.mark(Mark::MissEmpty).fg, None);
+    }
+}

@@ -1,0 +1,186 @@
+//! What is shown of a recording, and the keys that change it.
+
+use crate::recording::Recording;
+use crate::scene::{Colouring, Scene};
+use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use std::ops::Range;
+use std::time::Duration;
+
+/// Steps a second to choose from.
+pub const SPEEDS: [u32; 8] = [1, 2, 5, 10, 20, 50, 100, 200];
+
+/// Steps of a jump.
+pub const JUMP: usize = 10;
+
+/// Cells that the view moves by at a key.
+const SCROLL: i32 = 5;
+
+/// Cells around a robot that stay in view: none senses farther.
+const MARGIN: u16 = 3;
+
+/// A recording being looked at.
+#[derive(Clone, Debug)]
+pub struct Player<'a> {
+    /// What is played.
+    pub recording: &'a Recording,
+    /// The state that is shown, 0 to T.
+    pub t: usize,
+    /// Whether it goes on by itself.
+    pub playing: bool,
+    /// Whether the swarm is shown as it was before it was damaged.
+    pub before: bool,
+    /// What the colours of robots say.
+    pub colouring: Colouring,
+    /// The robot that is looked into.
+    pub picked: Option<usize>,
+    speed: usize,
+    /// The south-west cell of the view, if it does not show all.
+    corner: [u16; 2],
+    /// Whether the view moves along with the robot that is looked into.
+    following: bool,
+}
+
+impl<'a> Player<'a> {
+    /// At the start, waiting.
+    #[must_use]
+    pub fn new(recording: &'a Recording, colouring: Colouring) -> Self {
+        Self {
+            recording,
+            t: 0,
+            playing: false,
+            before: false,
+            colouring,
+            picked: None,
+            speed: 3,
+            corner: [0, u16::MAX],
+            following: false,
+        }
+    }
+
+    /// What is to be drawn.
+    #[must_use]
+    pub fn scene(&self) -> Scene {
+        match &self.recording.origin.damage {
+            Some(damage) if self.before => {
+                Scene::of_poses(self.recording, &damage.before, self.colouring)
+            }
+            _ => Scene::of(self.recording, self.t, self.colouring, self.picked),
+        }
+    }
+
+    /// Steps a second.
+    #[must_use]
+    pub fn speed(&self) -> u32 {
+        SPEEDS[self.speed]
+    }
+
+    /// Time from a step to the next; none while it waits.
+    #[must_use]
+    pub fn pause(&self) -> Option<Duration> {
+        self.playing.then(|| Duration::from_secs(1) / self.speed())
+    }
+
+    /// Plays one step more, and waits at the last.
+    pub fn go_on(&mut self) {
+        self.t = (self.t + 1).min(self.recording.steps());
+        self.playing = self.t < self.recording.steps();
+    }
+
+    /// Does what a key says; says whether that is to end.
+    pub fn key(&mut self, key: KeyEvent) -> bool {
+        if key.kind == KeyEventKind::Release {
+            return false;
+        }
+        let steps = self.recording.steps();
+        match key.code {
+            KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => return true,
+            KeyCode::Char('q') => return true,
+            KeyCode::Char(' ') => {
+                if !self.playing && self.t == steps {
+                    self.t = 0;
+                }
+                self.playing = !self.playing;
+                self.before = false;
+            }
+            KeyCode::Right => self.seek(self.t + 1),
+            KeyCode::Left => self.seek(self.t.saturating_sub(1)),
+            KeyCode::PageDown | KeyCode::Down => self.seek(self.t + JUMP),
+            KeyCode::PageUp | KeyCode::Up => self.seek(self.t.saturating_sub(JUMP)),
+            KeyCode::Home => self.seek(0),
+            KeyCode::End => self.seek(steps),
+            KeyCode::Char(digit @ '0'..='9') => {
+                self.seek(steps * (digit as usize - '0' as usize) / 10);
+            }
+            KeyCode::Char('+' | '=') => self.speed = (self.speed + 1).min(SPEEDS.len() - 1),
+            KeyCode::Char('-') => self.speed = self.speed.saturating_sub(1),
+            KeyCode::Char('n') | KeyCode::Tab => self.pick(1),
+            KeyCode::Char('p') | KeyCode::BackTab => self.pick(-1),
+            KeyCode::Esc => self.picked = None,
+            KeyCode::Char('c') => self.colouring = self.next_colouring(),
+            KeyCode::Char('b') if self.recording.origin.damage.is_some() => {
+                self.before = !self.before;
+                self.playing = false;
+            }
+            KeyCode::Char('h') => self.scroll(-SCROLL, 0),
+            KeyCode::Char('j') => self.scroll(0, -SCROLL),
+            KeyCode::Char('k') => self.scroll(0, SCROLL),
+            KeyCode::Char('l') => self.scroll(SCROLL, 0),
+            _ => {}
+        }
+        false
+    }
+
+    fn seek(&mut self, t: usize) {
+        self.t = t.min(self.recording.steps());
+        self.playing = false;
+        self.before = false;
+    }
+
+    /// Picks the next robot, or the one before; at first the first or the last.
+    fn pick(&mut self, by: i64) {
+        let robots = self.recording.robots() as i64;
+        let from = self.picked.map_or(by.min(0), |robot| robot as i64 + by);
+        self.picked = from.checked_rem_euclid(robots).map(|robot| robot as usize);
+        self.following = true;
+    }
+
+    /// Of a trajectory nothing but poses is known.
+    fn next_colouring(&self) -> Colouring {
+        match self.colouring {
+            Colouring::Structure if self.recording.minds.is_some() => Colouring::Surprise,
+            Colouring::Structure | Colouring::Surprise => Colouring::Plain,
+            Colouring::Plain => Colouring::Structure,
+        }
+    }
+
+    fn scroll(&mut self, east: i32, north: i32) {
+        let on = |from: u16, by: i32| (i32::from(from) + by).clamp(0, u16::MAX.into()) as u16;
+        self.corner = [on(self.corner[0], east), on(self.corner[1], north)];
+        self.following = false;
+    }
+
+    /// The cells, from west and from south, that a view of so many shows; a robot that is followed
+    /// is among them.
+    pub fn view(&mut self, columns: u16, rows: u16) -> [Range<u16>; 2] {
+        let grid = self.recording.grid;
+        let poses = self.recording.poses(self.t);
+        let followed = self.picked.filter(|_| self.following);
+        let followed = followed.and_then(|robot| poses.get(robot));
+        let axes = [
+            (0, columns, grid.width(), followed.map(|pose| pose.x)),
+            (1, rows, grid.height(), followed.map(|pose| pose.y)),
+        ];
+        axes.map(|(axis, room, cells, robot)| {
+            let shown = room.min(cells);
+            let mut from = self.corner[axis].min(cells - shown);
+            if let Some(robot) = robot {
+                let margin = MARGIN.min(shown.saturating_sub(1) / 2);
+                let most = robot.saturating_sub(margin);
+                let least = (robot + margin + 1).saturating_sub(shown);
+                from = from.min(most).max(least).min(cells - shown);
+            }
+            self.corner[axis] = from;
+            from..from + shown
+        })
+    }
+}
