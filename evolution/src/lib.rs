@@ -10,6 +10,7 @@ pub mod evolving;
 pub mod experiment;
 pub mod files;
 pub mod finished_run;
+pub mod fitness;
 pub mod generation_work;
 pub mod limits;
 pub mod lock;

@@ -6,7 +6,7 @@ use minimal_surprise_controller::{Controller, Genome};
 use minimal_surprise_sim::damage::{Damage, DamageError};
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::metrics::{Match, similarity};
-use minimal_surprise_sim::structures::{LineOrientation, Structure, classify};
+use minimal_surprise_sim::structures::{LineOrientation, Pattern, Structure, classify};
 use minimal_surprise_sim::{Pose, Scenario, SeedTree, Trial, WorldError};
 use rayon::prelude::*;
 
@@ -131,9 +131,7 @@ fn resilience_row(
         .par_iter()
         .map(|(conditions, trial)| {
             let outcome = run(&controller, conditions, trial, |_| {})?;
-            let share = |poses: &[Pose]| {
-                classify(conditions.grid(), poses).map(|found| found.share(structure))
-            };
+            let share = |poses: &[Pose]| structure.share(conditions.grid(), poses);
             Ok([
                 trial.starts.len() as f64,
                 outcome.fitness(),

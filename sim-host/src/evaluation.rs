@@ -125,7 +125,8 @@ pub fn evaluate(genome: &Genome, scenario: &Scenario, trials: &[Trial]) -> Evalu
 }
 
 /// Matches and scored bits of the whole swarm so far.
-fn matches_of(world: &World) -> (u64, u64) {
+#[must_use]
+pub fn matches_of(world: &World) -> (u64, u64) {
     world
         .states()
         .iter()

@@ -261,7 +261,7 @@ settings! {
         (selection != Selection::Roulette).then(|| selection.to_string().into())
     };
 
-    /// Probability that a child takes each weight from one of two parents.
+    /// Probability that a child has two parents, and each weight from either.
     crossover: f64 = 0.0,
     "crossover", "P", default "0",
     valid "from 0 to 1", list "crossover",

@@ -138,6 +138,33 @@ impl core::fmt::Display for Structure {
     }
 }
 
+/// A pattern that robots may stand in: one of the paper's, or one of your own.
+pub trait Pattern {
+    /// Whether each robot belongs to it, robot 0 first.
+    ///
+    /// # Errors
+    /// [`WorldError`] if a robot is outside the grid or two share a cell.
+    fn members(&self, grid: Grid, poses: &[Pose]) -> Result<Vec<bool>, WorldError>;
+
+    /// Share of the robots that belong to it, 0 to 1; 0 without robots.
+    ///
+    /// # Errors
+    /// [`WorldError`] if a robot is outside the grid or two share a cell.
+    fn share(&self, grid: Grid, poses: &[Pose]) -> Result<f64, WorldError> {
+        let members = self.members(grid, poses)?;
+        let count = members.iter().filter(|&&member| member).count();
+        Ok(count as f64 / members.len().max(1) as f64)
+    }
+}
+
+impl Pattern for Structure {
+    fn members(&self, grid: Grid, poses: &[Pose]) -> Result<Vec<bool>, WorldError> {
+        let found = classify(grid, poses)?;
+        let members = found.members(*self).map(<[bool]>::to_vec);
+        Ok(members.unwrap_or_else(|| vec![false; poses.len()]))
+    }
+}
+
 /// What a swarm has assembled into, and which robots belong to it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Structures {

@@ -1,0 +1,69 @@
+//! An analysis of your own: how the robots' headings agree over the steps of a finished run.
+//!
+//! `cargo run --release -p minimal-surprise-evolution --example own_analysis -- RUN`, where `RUN` is
+//! a run directory; without one, a short evolution is made.
+
+use minimal_surprise_evolution::evolving::until_finished;
+use minimal_surprise_evolution::experiment::Experiment;
+use minimal_surprise_evolution::finished_run::FinishedRun;
+use minimal_surprise_evolution::run_dir::RunDir;
+use minimal_surprise_evolution::run_files::Program;
+use minimal_surprise_evolution::settings::Settings;
+use minimal_surprise_sim::{Engine, Heading, Path as EnginePath};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let scratch = tempfile::tempdir()?;
+    let directory = match std::env::args_os().nth(1) {
+        Some(directory) => PathBuf::from(directory),
+        None => evolved(scratch.path())?,
+    };
+    let finished = FinishedRun::read(&directory)?;
+    let mut step = 0;
+    finished.replay(|world| {
+        step += 1;
+        let heading = |heading: Heading| {
+            world
+                .poses()
+                .iter()
+                .filter(|pose| pose.heading == heading)
+                .count()
+        };
+        let most = Heading::ALL.map(heading).into_iter().max().unwrap_or(0);
+        if step % 50 == 0 {
+            let share = most as f64 / world.poses().len() as f64;
+            println!(
+                "step {step}: {:.0} % of the robots have one heading",
+                100.0 * share
+            );
+        }
+    })?;
+    Ok(())
+}
+
+/// A run made here.
+fn evolved(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
+    let settings = Settings::builder()
+        .population(8_u32)
+        .generations(5_u32)
+        .repetitions(2_u32)
+        .steps(200_u32)
+        .build()?;
+    let directory = folder.join("run");
+    let mut experiment = Experiment::new(settings);
+    let run = RunDir::create(&directory, &experiment, &Program::default())?;
+    let engine = (Engine::Fast, EnginePath::best());
+    until_finished(
+        &mut experiment,
+        &run,
+        engine,
+        &AtomicBool::new(false),
+        |_| {},
+    )?;
+    if let Some(finding) = experiment.finding()? {
+        run.finish(&experiment, &finding)?;
+    }
+    Ok(directory)
+}

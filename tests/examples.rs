@@ -1,0 +1,66 @@
+//! The examples of the libraries run, and show what they are there to show.
+
+use escargot::CargoBuild;
+use std::path::Path;
+
+/// The lines that an example prints.
+fn lines_of(example: &str) -> Vec<String> {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../Cargo.toml");
+    let built = CargoBuild::new()
+        .manifest_path(workspace)
+        .package("minimal-surprise-evolution")
+        .example(example)
+        .release()
+        .run()
+        .unwrap_or_else(|error| panic!("{example}: {error}"));
+    let output = built.command().output().expect("the example starts");
+    assert!(output.status.success(), "{example}: {output:?}");
+    let text = String::from_utf8(output.stdout).expect("text");
+    text.lines().map(str::to_owned).collect()
+}
+
+/// The number at the end of a line, without what follows it.
+fn number(line: &str, prefix: &str) -> f64 {
+    let rest = line.split_once(prefix).map_or("", |(_, rest)| rest);
+    let digits = rest.split(' ').next().unwrap_or_default();
+    digits
+        .parse()
+        .unwrap_or_else(|error| panic!("{line}: {error}"))
+}
+
+#[test]
+fn a_fitness_of_ones_own_is_what_swarms_are_selected_for() {
+    let lines = lines_of("own_fitness");
+    assert_eq!(lines.len(), 15, "{lines:?}");
+    let [first, last] = [&lines[0], &lines[14]].map(|line| number(line, ": "));
+    assert!(last > 1.1 * first, "{lines:?}");
+}
+
+#[test]
+fn a_selection_of_ones_own_and_another_optimiser_drive_the_population() {
+    for example in ["own_selection", "ask_tell"] {
+        let lines = lines_of(example);
+        assert_eq!(lines.len(), 15, "{example}: {lines:?}");
+        let [first, last] = [&lines[0], &lines[14]].map(|line| number(line, "fitness "));
+        assert!(last > first && last < 1.0, "{example}: {lines:?}");
+    }
+}
+
+#[test]
+fn an_analysis_of_ones_own_sees_every_step_of_a_finished_run() {
+    let lines = lines_of("own_analysis");
+    assert_eq!(lines.len(), 4, "{lines:?}");
+    for line in &lines {
+        assert!((25.0..=100.0).contains(&number(line, ": ")), "{lines:?}");
+    }
+}
+
+#[test]
+fn a_structure_of_ones_own_is_measured_beside_the_papers() {
+    let lines = lines_of("own_structure");
+    assert_eq!(lines.len(), 3, "{lines:?}");
+    assert!(
+        lines.iter().any(|line| number(line, ": ") > 0.0),
+        "{lines:?}"
+    );
+}
