@@ -6,6 +6,7 @@
 
 pub mod checkpoint;
 pub mod damaged_runs;
+#[cfg(feature = "files")]
 pub mod evolving;
 pub mod experiment;
 pub mod files;
@@ -13,11 +14,14 @@ pub mod finished_run;
 pub mod fitness;
 pub mod generation_work;
 pub mod limits;
+#[cfg(feature = "files")]
 pub mod lock;
+#[cfg(feature = "files")]
 pub mod new_dir;
 pub mod population;
 pub mod ranges;
 pub mod reevaluation;
+#[cfg(feature = "files")]
 pub mod run_dir;
 pub mod run_files;
 pub mod run_hash;

@@ -4,6 +4,9 @@
 //! Estimates are of the peak, and right within a factor of two from some ten megabytes on: the test
 //! `limits` measures it. Where the system does not tell what there is, nothing is refused.
 
+#[cfg(feature = "files")]
+mod machine;
+
 use crate::experiment::GenerationRecord;
 use crate::files::TEXT_BYTES_MAX;
 use crate::run_files::{FINAL, GENERATIONS};
@@ -69,8 +72,8 @@ impl Place {
 
     fn available(&self) -> Option<u64> {
         match self {
-            Self::Memory => memory_available(),
-            Self::Disk(directory) => disk_available(directory),
+            Self::Memory => machine::memory_available(),
+            Self::Disk(directory) => machine::disk_available(directory),
         }
     }
 }
@@ -509,44 +512,16 @@ fn finished_bytes(settings: &Settings) -> f64 {
         + 6.0 * BLOCK_BYTES
 }
 
-/// Memory that this process can still get: of the machine, of its cgroup, of its address space.
-fn memory_available() -> Option<u64> {
-    use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System};
-    let mut system = System::new().ok()?;
-    system.refresh_memory();
-    let machine = Some(system.available_memory()).filter(|&bytes| bytes > 0);
-    let pid = sysinfo::get_current_pid().ok();
-    let memory = ProcessRefreshKind::nothing().with_memory();
-    let processes = ProcessesToUpdate::Some(pid.as_slice());
-    system.refresh_processes_specifics(processes, false, memory);
-    let process = pid.and_then(|pid| system.process(pid));
-    // What a cgroup has cached of files, it can drop.
-    let cgroup = process
-        .and_then(|process| process.cgroup_limits())
-        .map(|limits| limits.total_memory.saturating_sub(limits.rss));
-    let in_use = process.map_or(0, |process| process.virtual_memory());
-    let address_space = address_space_max().map(|most| most.saturating_sub(in_use));
-    [machine, cgroup, address_space].into_iter().flatten().min()
-}
+/// Without an operating system to ask, nothing is refused.
+#[cfg(not(feature = "files"))]
+mod machine {
+    use std::path::Path;
 
-#[cfg(unix)]
-fn address_space_max() -> Option<u64> {
-    use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
-    let (most, _) = getrlimit(Resource::RLIMIT_AS).ok()?;
-    (most != RLIM_INFINITY).then_some(most)
-}
+    pub(super) fn memory_available() -> Option<u64> {
+        None
+    }
 
-#[cfg(not(unix))]
-fn address_space_max() -> Option<u64> {
-    None
-}
-
-/// Free bytes of the disk that a path is on; of its first ancestor that there is, if it is to be
-/// made.
-fn disk_available(path: &Path) -> Option<u64> {
-    let absolute = std::path::absolute(path).ok()?;
-    let existing = absolute.ancestors().find(|path| path.exists())?;
-    // A file system that is no disk, as /proc, says nothing of what it could hold.
-    let disk = fs4::statvfs(existing).ok()?;
-    (disk.total_space() > 0).then(|| disk.available_space())
+    pub(super) fn disk_available(_: &Path) -> Option<u64> {
+        None
+    }
 }

@@ -1,0 +1,45 @@
+//! What this machine has.
+
+use std::path::Path;
+use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System};
+
+/// Memory that this process can still get: of the machine, of its cgroup, of its address space.
+pub(super) fn memory_available() -> Option<u64> {
+    let mut system = System::new().ok()?;
+    system.refresh_memory();
+    let machine = Some(system.available_memory()).filter(|&bytes| bytes > 0);
+    let pid = sysinfo::get_current_pid().ok();
+    let memory = ProcessRefreshKind::nothing().with_memory();
+    let processes = ProcessesToUpdate::Some(pid.as_slice());
+    system.refresh_processes_specifics(processes, false, memory);
+    let process = pid.and_then(|pid| system.process(pid));
+    // What a cgroup has cached of files, it can drop.
+    let cgroup = process
+        .and_then(|process| process.cgroup_limits())
+        .map(|limits| limits.total_memory.saturating_sub(limits.rss));
+    let in_use = process.map_or(0, |process| process.virtual_memory());
+    let address_space = address_space_max().map(|most| most.saturating_sub(in_use));
+    [machine, cgroup, address_space].into_iter().flatten().min()
+}
+
+#[cfg(unix)]
+fn address_space_max() -> Option<u64> {
+    use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
+    let (most, _) = getrlimit(Resource::RLIMIT_AS).ok()?;
+    (most != RLIM_INFINITY).then_some(most)
+}
+
+#[cfg(not(unix))]
+fn address_space_max() -> Option<u64> {
+    None
+}
+
+/// Free bytes of the disk that a path is on; of its first ancestor that there is, if it is to be
+/// made.
+pub(super) fn disk_available(path: &Path) -> Option<u64> {
+    let absolute = std::path::absolute(path).ok()?;
+    let existing = absolute.ancestors().find(|path| path.exists())?;
+    // A file system that is no disk, as /proc, says nothing of what it could hold.
+    let disk = fs4::statvfs(existing).ok()?;
+    (disk.total_space() > 0).then(|| disk.available_space())
+}
