@@ -18,10 +18,7 @@ fn genome(topology: Topology, weights: &DVector<f64>) -> Genome {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let settings = Settings::builder()
-        .steps(100_u32)
-        .repetitions(3_u32)
-        .build()?;
+    let settings = Settings::builder().steps(100).repetitions(3).build()?;
     let (scenario, topology) = (settings.scenario(), settings.topology());
     let seeds = SeedTree::new(settings.seed());
     let trial = |repetition| scenario.trial(seeds, 0, repetition);

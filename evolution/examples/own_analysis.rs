@@ -46,10 +46,10 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// A run made here.
 fn evolved(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
     let settings = Settings::builder()
-        .population(8_u32)
-        .generations(5_u32)
-        .repetitions(2_u32)
-        .steps(200_u32)
+        .population(8)
+        .generations(5)
+        .repetitions(2)
+        .steps(200)
         .build()?;
     let directory = folder.join("run");
     let mut experiment = Experiment::new(settings);

@@ -29,10 +29,10 @@ impl Fitness for Moves {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = Settings::builder()
-        .robots(60_u32)
-        .steps(100_u32)
-        .population(20_u32)
-        .repetitions(3_u32)
+        .robots(60)
+        .steps(100)
+        .population(20)
+        .repetitions(3)
         .build()?;
     let (scenario, seeds) = (settings.scenario(), SeedTree::new(settings.seed()));
     let mut population = Population::random(settings.topology(), settings.population(), seeds);

@@ -29,9 +29,9 @@ impl SelectParent for Truncation {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = Settings::builder()
-        .steps(100_u32)
-        .population(20_u32)
-        .repetitions(3_u32)
+        .steps(100)
+        .population(20)
+        .repetitions(3)
         .build()?;
     let (scenario, seeds) = (settings.scenario(), SeedTree::new(settings.seed()));
     let scored = settings.scored_bits() as f64;

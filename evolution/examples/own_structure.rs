@@ -38,10 +38,10 @@ impl Pattern for Block {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     for seed in 1..=3 {
         let settings = Settings::builder()
-            .population(10_u32)
-            .generations(10_u32)
-            .repetitions(2_u32)
-            .steps(200_u32)
+            .population(10)
+            .generations(10)
+            .repetitions(2)
+            .steps(200)
             .seed(seed)
             .build()?;
         let grid = settings.scenario().grid();
