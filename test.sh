@@ -133,6 +133,10 @@ say 'the engine for processors that are not x86-64'
 scripts/thumb-cargo.sh check --locked --package minimal-surprise-sim \
     --target aarch64-unknown-linux-gnu
 
+say 'the libraries for a browser'
+scripts/thumb-cargo.sh check --locked --no-default-features --package minimal-surprise-evolution \
+    --package minimal-surprise-replay --target wasm32-unknown-unknown
+
 say 'packages'
 cargo package --locked --workspace --exclude tests --exclude robot-support --allow-dirty --no-verify
 
