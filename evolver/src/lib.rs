@@ -1,9 +1,9 @@
-//! Evolution of minimal-surprise swarms on the host: the genetic algorithm, experiments, run
-//! directories, and the command line `evolver`.
+//! The program `evolver`: its command line and commands, suites of evolutions, reports, exports, and
+//! the robot on a serial line.
 //!
-//! Data flows one way: [`settings`] → [`evolution`] → [`experiment`] → [`checkpoint`],
-//! [`finished_run`] and [`run_dir`] → [`reevaluation`], [`hil`], [`replay`] and [`suite`] →
-//! [`report`] → [`commands`] → [`cli`]. Beside it: [`robot`], a robot on a serial line.
+//! Evolution is the library `minimal-surprise-evolution`, and showing runs is
+//! `minimal-surprise-replay`; here [`suite`] → [`report`] → [`commands`] → [`cli`] put them to use,
+//! and [`robot`] and [`hil`] bring in a real robot.
 #![forbid(unsafe_code)]
 
 #[macro_use]

@@ -233,6 +233,14 @@ impl Settings {
             .saturating_mul(self.scenario.robots().into())
     }
 
+    /// Robot-steps of the whole evolution.
+    #[must_use]
+    pub fn robot_steps(&self) -> u64 {
+        let generations = u64::from(self.generations());
+        self.robot_steps_per_generation()
+            .saturating_mul(generations)
+    }
+
     /// Bits scored in one repetition: a fitness is a number of matches over this.
     #[must_use]
     pub fn scored_bits(&self) -> u64 {

@@ -4,6 +4,7 @@ use crate::exit::Exit;
 use crate::output;
 use crate::suite::report::ReportError;
 use crate::suite::slurm::SubmitError;
+use crate::suite::worker::ToDoError;
 use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_evolution::files::FileError;
 use minimal_surprise_evolution::finished_run::ReadRunError;
@@ -136,6 +137,15 @@ impl AboutInput for RunDirError {
             Self::NotThere(error) | Self::File(error) => error.is_bad_input(),
             Self::Damaged(error) => error.is_bad_input(),
             Self::InUse { .. } | Self::Checkpoint { .. } => false,
+        }
+    }
+}
+
+impl AboutInput for ToDoError {
+    fn is_bad_input(&self) -> bool {
+        match self {
+            Self::TooMuch(_) => true,
+            Self::Folder(error) => error.is_bad_input(),
         }
     }
 }

@@ -4,33 +4,28 @@ use super::errors::{Unfinished, name_damaged, stopped, unusable};
 use super::{BadInput, flag, thread_pool, threads_flag};
 use crate::exit::Exit;
 use crate::report::progress::ProgressMode;
-use crate::report::suite_progress::{SearchProgress, SuiteProgress, robot_steps};
+use crate::report::suite_progress::{SearchProgress, SuiteProgress};
 use crate::signals::stop_on_signal;
-use crate::suite::plan::{Plan, PlannedRun, RUNS, Runs};
+use crate::suite::plan::{Plan, RUNS};
 use crate::suite::report;
 use crate::suite::report::gather::Gathered;
 use crate::suite::search::{Search, look};
-use crate::suite::work::{Shard, Waiting, Worked, progress, work_on};
+use crate::suite::status::{Counts, Hashes, Status};
+use crate::suite::work::Shard;
+use crate::suite::worker::{Ended, ToDo, Worker};
 use crate::suite::{PAPER, Resilience, Suite, slurm};
 use clap::{Args, Subcommand, ValueEnum};
 use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_evolution::files::{self, Existing, FileError, TEXT_BYTES_MAX};
-use minimal_surprise_evolution::finished_run::{Progress, ReadRunError};
-use minimal_surprise_evolution::limits::{self, Needs, NeedsOfRuns};
-use minimal_surprise_evolution::lock::Holder;
+use minimal_surprise_evolution::finished_run::ReadRunError;
+use minimal_surprise_evolution::limits::{self, Needs};
 use minimal_surprise_evolution::new_dir::remove_abandoned;
-use minimal_surprise_evolution::run_dir::{RunDir, tidy};
 use minimal_surprise_evolution::settings::count;
-use minimal_surprise_evolution::text::{
-    file_name_except, hex, shell_path, shell_word, terminal_path,
-};
+use minimal_surprise_evolution::text::{file_name_except, shell_path, shell_word, terminal_path};
 use minimal_surprise_replay::gallery;
 use minimal_surprise_sim::Path as CodePath;
-use sha2::{Digest, Sha256};
 use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Name of the directory of the paper's suite.
 const BUILT_IN: &str = "paper";
@@ -56,7 +51,7 @@ pub enum Verb {
         choice: Choice,
         /// How to work.
         #[command(flatten)]
-        manner: Manner,
+        options: RunOptions,
     },
     /// Say how many runs are done; once all are, one hash for all.
     Status(Choice),
@@ -132,7 +127,7 @@ impl Choice {
 
 /// How to work.
 #[derive(Debug, Args)]
-pub struct Manner {
+pub struct RunOptions {
     /// Threads [default: one a core]; no result depends on them.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     threads: Option<String>,
@@ -160,12 +155,14 @@ pub struct TaskArgs {
     #[command(flatten)]
     choice: Choice,
     #[command(flatten)]
-    manner: Manner,
+    options: RunOptions,
 }
 
 /// A suite as it was read.
 struct Read {
     suite: Suite,
+    /// Whether it is the built-in one.
+    built_in: bool,
     text: String,
     /// The command that it was read by.
     called: String,
@@ -182,6 +179,7 @@ pub fn paper(verb: &Verb) -> anyhow::Result<Exit> {
     act(
         &Read {
             suite,
+            built_in: true,
             text,
             called,
         },
@@ -205,13 +203,13 @@ pub fn run_task(arguments: &TaskArgs) -> anyhow::Result<Exit> {
     let shard = flag("shard", &arguments.shard, Shard::parse)?;
     let read = read(&arguments.suite)?;
     let plan = plan(&read.suite, &arguments.choice)?;
-    let directory = directory(&read.suite, &arguments.choice);
+    let directory = directory(&read, &arguments.choice);
     run(&Work {
         read: &read,
         choice: &arguments.choice,
         plan: &plan,
         directory: &directory,
-        manner: &arguments.manner,
+        options: &arguments.options,
         share: Share::One(shard),
     })
 }
@@ -222,6 +220,7 @@ fn read(file: &Path) -> Result<Read, BadInput> {
     let called = format!("evolver suite {}", shell_path(file));
     Ok(Read {
         suite,
+        built_in: false,
         text,
         called,
     })
@@ -234,7 +233,7 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
     | Verb::Report { choice, .. }
     | Verb::Submit { choice, .. }) = verb;
     let plan = plan(&read.suite, choice)?;
-    let directory = directory(&read.suite, choice);
+    let directory = directory(read, choice);
     match verb {
         Verb::Plan(_) => print_plan(&plan, &read.suite, searches(&read.suite, choice)),
         Verb::Status(_) => {
@@ -285,13 +284,13 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
             );
             return Ok(name_damaged(&damaged, Some(&again)));
         }
-        Verb::Run { manner, .. } => {
+        Verb::Run { options, .. } => {
             return run(&Work {
                 read,
                 choice,
                 plan: &plan,
                 directory: &directory,
-                manner,
+                options,
                 share: Share::Whole,
             });
         }
@@ -319,7 +318,8 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
             };
             if !*dry_run {
                 // Memory is that of the machines that the tasks run on.
-                let to_do = ToDo::of(plan.runs(), &directory, 1.0, &mut DamagedRuns::default())?;
+                let to_do = ToDo::read(plan.runs(), &directory, 1.0, &mut DamagedRuns::default())
+                    .map_err(unusable)?;
                 let needs = to_do.needs.needs();
                 needs.check_disk(&directory).map_err(BadInput::new)?;
             }
@@ -404,10 +404,11 @@ fn plan(suite: &Suite, choice: &Choice) -> Result<Plan, BadInput> {
     Plan::new(&suite, choice.only.as_deref(), runs, choice.all).map_err(BadInput::new)
 }
 
-fn directory(suite: &Suite, choice: &Choice) -> PathBuf {
+fn directory(read: &Read, choice: &Choice) -> PathBuf {
+    let suite = &read.suite;
     choice.out.clone().unwrap_or_else(|| {
         let runs = Path::new("runs");
-        let taken = if suite.built_in { "" } else { BUILT_IN };
+        let taken = if read.built_in { "" } else { BUILT_IN };
         // What an earlier version called so is continued.
         let mut there = fs::read_dir(runs).into_iter().flatten().flatten();
         if suite.name != taken && there.any(|entry| entry.file_name() == *suite.name) {
@@ -475,59 +476,32 @@ fn in_words(number: f64) -> String {
     }
 }
 
-/// Looks whether a run that is not complete can be gone on with.
-fn check_begun(run: &PlannedRun, suite: &Path, damaged: &mut DamagedRuns) {
-    let is_begun = || matches!(progress(run, suite), Ok(Progress::Begun));
-    let directory = run.directory(suite);
-    // Another process may have completed it meanwhile.
-    if is_begun()
-        && let Err(error) = RunDir::check_unfinished(&directory)
-        && is_begun()
-    {
-        damaged.add(&directory, error.cause());
-    }
-}
-
-/// Shows how many runs are done, and gives the damaged ones back.
+/// Shows how many runs are done, and returns the damaged ones.
 fn print_status(plan: &Plan, directory: &Path) -> Result<DamagedRuns, ReadRunError> {
-    let mut damaged = DamagedRuns::default();
-    let (runs, mut hash, mut done) = (plan.runs(), Sha256::new(), 0);
-    each_hash(runs, directory, &mut damaged, |line| {
-        hash.update(line);
-        done += 1;
-    });
-    for experiment in &plan.experiments {
-        show_line!("{}", experiment.name);
-        for settings in experiment.settings() {
-            let (mut done, mut begun, mut spoilt) = (0, 0, 0);
-            for run in settings.runs() {
-                check_begun(&run, directory, &mut damaged);
-                if damaged.contains(&run.directory(directory)) {
-                    spoilt += 1;
-                    continue;
-                }
-                match progress(&run, directory)? {
-                    Progress::Done => done += 1,
-                    Progress::Begun => begun += 1,
-                    Progress::Pending => {}
-                }
-            }
-            let spoilt = match spoilt {
+    let status = Status::read(plan, directory)?;
+    for (experiment, settings) in &status.experiments {
+        show_line!("{experiment}");
+        for counts in settings {
+            let damaged = match counts.damaged {
                 0 => String::new(),
                 number => format!(", {number} damaged"),
             };
-            show_line!(
-                "  {:<40} {done:>4} of {} done, {begun} begun{spoilt}",
-                settings.label,
-                settings.number
-            );
+            let Counts {
+                label,
+                number,
+                done,
+                begun,
+                ..
+            } = counts;
+            show_line!("  {label:<40} {done:>4} of {number} done, {begun} begun{damaged}");
         }
     }
-    show_line!("\n{done} of {} different runs done", runs.number());
-    if done == runs.number() {
-        show_line!("hash {}", hex(&hash.finalize()));
+    let number = plan.runs().number();
+    show_line!("\n{} of {number} different runs done", status.done);
+    if let Some(hash) = &status.hash {
+        show_line!("hash {hash}");
     }
-    Ok(damaged)
+    Ok(status.damaged)
 }
 
 /// The structures that are searched for.
@@ -581,63 +555,6 @@ fn print_searches(
     }
 }
 
-/// What is to be done of some runs, by a look at their files.
-struct ToDo {
-    /// Of each run, whether it is to be done.
-    each: Vec<bool>,
-    number: u64,
-    robot_steps: u64,
-    needs: NeedsOfRuns,
-}
-
-impl ToDo {
-    /// Looks at the files; a damaged run is not to be done.
-    ///
-    /// # Errors
-    /// [`BadInput`] if they have no folder to be in, or the disk holds them not even nearly, before
-    /// billions are looked at.
-    fn of(
-        runs: Runs<'_>,
-        suite: &Path,
-        threads: f64,
-        damaged: &mut DamagedRuns,
-    ) -> anyhow::Result<Self> {
-        let mut all = NeedsOfRuns::default();
-        for alike in runs.by_settings() {
-            all.add(alike.settings(), alike.number(), threads);
-        }
-        let folder = suite.join(RUNS);
-        let there = match fs::read_dir(&folder) {
-            Ok(there) => there.count() as u64,
-            Err(error) if error.kind() == ErrorKind::NotFound => 0,
-            Err(error) => return Err(unusable(FileError::at(&folder)(error))),
-        };
-        let at_least = all.at_least_without(there);
-        at_least.check_disk(suite).map_err(BadInput::new)?;
-        let mut to_do = Self {
-            each: Vec::new(),
-            number: 0,
-            robot_steps: 0,
-            needs: NeedsOfRuns::default(),
-        };
-        for alike in runs.by_settings() {
-            let before = to_do.number;
-            let settings = alike.settings().clone();
-            for run in alike.runs() {
-                let looked = damaged.take(&run.directory(suite), progress(&run, suite));
-                let waits = looked.is_some_and(|progress| progress != Progress::Done);
-                to_do.each.push(waits);
-                if waits {
-                    to_do.number += 1;
-                    to_do.robot_steps = to_do.robot_steps.saturating_add(robot_steps(&run));
-                }
-            }
-            to_do.needs.add(&settings, to_do.number - before, threads);
-        }
-        Ok(to_do)
-    }
-}
-
 /// Which of the runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Share {
@@ -653,7 +570,7 @@ struct Work<'a> {
     choice: &'a Choice,
     plan: &'a Plan,
     directory: &'a Path,
-    manner: &'a Manner,
+    options: &'a RunOptions,
     share: Share,
 }
 
@@ -661,69 +578,68 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     let Work {
         plan,
         directory,
-        manner,
+        options,
         ..
     } = *work;
     let (shard, to_search) = match work.share {
         Share::Whole => (Shard::ALL, searches(&work.read.suite, work.choice)),
         Share::One(shard) => (shard, [].as_slice()),
     };
-    let threads = threads_flag(&manner.threads)?;
+    let threads = threads_flag(&options.threads)?;
     // What `evolve` refuses, too, before anything is done.
     CodePath::from_environment().map_err(BadInput::new)?;
     let runs = shard.of_plan(plan);
     let mut damaged = DamagedRuns::default();
-    let to_do = ToDo::of(runs, directory, limits::threads(threads), &mut damaged)?;
+    let threads_or_cores = limits::threads(threads);
+    let to_do = ToDo::read(runs, directory, threads_or_cores, &mut damaged).map_err(unusable)?;
     let needs = to_do.needs.needs();
     needs.check_memory().map_err(BadInput::new)?;
     needs.check_disk(directory).map_err(BadInput::new)?;
-    let mut worker = Worker {
-        plan,
-        directory,
-        mode: manner.progress,
-        stop: stop_on_signal()?,
-        damaged,
-        begun: false,
-    };
+    let mut worker = Worker::new(plan, directory, stop_on_signal()?, damaged);
     remove_abandoned(&directory.join(RUNS));
-    let worked = thread_pool(threads)?.install(|| -> anyhow::Result<bool> {
-        let mut worked = worker.do_all(runs, &to_do)?;
+    let mode = options.progress;
+    let worked = thread_pool(threads)?.install(|| {
+        let (number, left) = (to_do.number, to_do.robot_steps);
+        let shown = SuiteProgress::start(mode, plan, runs.number(), number, left);
+        let mut ended = worker.do_all(runs, &to_do, &shown);
+        shown.end();
         for asked in to_search {
-            worked = worked && worker.search(asked)?;
+            if !matches!(ended, Ok(Ended::Whole)) {
+                break;
+            }
+            let shown = SearchProgress::start(mode, &asked.name);
+            ended = worker.search(asked, &shown);
+            shown.end();
         }
-        Ok(worked)
-    })?;
+        ended
+    });
+    let ended = match worked {
+        Err(error) if worker.begun => return Err(error.into()),
+        worked => worked.map_err(unusable)?,
+    };
     let mut damaged = worker.damaged;
-    if !worked {
+    if ended == Ended::Interrupted {
         return match work.share {
             Share::Whole => stopped(&command(work.read, work.choice, directory)),
             Share::One(_) => stopped("the same command"),
         };
     }
-    // Looked at once, so that number and hash are of one moment.
-    let mut hash = Sha256::new();
-    let mut hashes = Vec::new();
-    let mut done = 0;
-    each_hash(runs, directory, &mut damaged, |line| {
-        hash.update(line);
-        // A part's would take the place of the whole's.
-        if work.choice.is_whole() {
-            hashes.extend(line.as_bytes());
-        }
-        done += 1;
-    });
+    // Read at one moment, so that number and hash agree. A part's lines would replace the whole's.
+    let is_whole = work.choice.is_whole();
+    let mut hashes = Hashes::read(runs, directory, is_whole, &mut damaged);
+    let done = hashes.done;
     let all_done = done == runs.number();
-    if all_done && work.choice.is_whole() {
+    if let Some(lines) = hashes.lines.take().filter(|_| all_done) {
         fs::create_dir_all(directory).map_err(FileError::at(directory))?;
-        files::replace(&directory.join(shard.hashes_file()), &hashes)?;
+        files::replace(&directory.join(shard.hashes_file()), &lines)?;
     }
     // A share's would be one that no other number of shares gives.
-    let hash = (all_done && shard == Shard::ALL).then(|| hex(&hash.finalize()));
+    let hash = hashes.of_all(runs).filter(|_| shard == Shard::ALL);
     let search_by = match work.share {
         Share::Whole => None,
         Share::One(_) => search_by(work),
     };
-    if manner.progress == ProgressMode::Json {
+    if options.progress == ProgressMode::Json {
         show_line!(
             "{}",
             serde_json::json!({
@@ -776,163 +692,6 @@ fn search_by(work: &Work) -> Option<String> {
     };
     let needed = searches(&read.suite, choice).iter().any(is_needed);
     needed.then(|| command(read, choice, directory))
-}
-
-/// Does runs one after the other.
-struct Worker<'a> {
-    plan: &'a Plan,
-    directory: &'a Path,
-    mode: ProgressMode,
-    stop: &'a AtomicBool,
-    damaged: DamagedRuns,
-    /// Whether anything was done.
-    begun: bool,
-}
-
-/// Runs that other processes work on.
-type Held = Vec<(PlannedRun, Option<Holder>)>;
-
-impl Worker<'_> {
-    /// Works on a run; none if something is wrong with this run alone, which is then known as
-    /// damaged.
-    fn work_on(
-        &mut self,
-        run: &PlannedRun,
-        mut each_generation: impl FnMut(u32),
-    ) -> anyhow::Result<Option<Worked>> {
-        let directory = run.directory(self.directory);
-        let worked = work_on(run, self.directory, self.stop, |generation| {
-            self.begun = true;
-            each_generation(generation);
-        });
-        match worked {
-            Ok(worked) => {
-                self.begun |= worked == Worked::Completed;
-                Ok(Some(worked))
-            }
-            Err(error) if error.is_of_one_run(&directory) => {
-                self.damaged.add(&directory, error.cause());
-                Ok(None)
-            }
-            Err(error) if self.begun => Err(error.into()),
-            Err(error) => Err(unusable(error)),
-        }
-    }
-
-    /// [`Worker::work_on`], shown; false if interrupted.
-    fn do_one(
-        &mut self,
-        run: PlannedRun,
-        shown: &SuiteProgress<'_>,
-        held: &mut Held,
-    ) -> anyhow::Result<bool> {
-        shown.begins(&run);
-        match self.work_on(&run, |generation| shown.generation(&run, generation))? {
-            Some(Worked::Completed) => shown.completed(&run),
-            Some(Worked::Held(holder)) => held.push((run, holder)),
-            Some(Worked::Interrupted) => return Ok(false),
-            None => {}
-        }
-        Ok(true)
-    }
-
-    /// Does what is to be done, and waits for what other processes do; false if interrupted.
-    fn do_all(&mut self, runs: Runs<'_>, to_do: &ToDo) -> anyhow::Result<bool> {
-        let (number, left) = (to_do.number, to_do.robot_steps);
-        let shown = SuiteProgress::start(self.mode, self.plan, runs.number(), number, left);
-        let ended = self.do_all_shown(runs, to_do, &shown);
-        shown.end();
-        ended
-    }
-
-    fn do_all_shown(
-        &mut self,
-        runs: Runs<'_>,
-        to_do: &ToDo,
-        shown: &SuiteProgress<'_>,
-    ) -> anyhow::Result<bool> {
-        let mut held = Held::new();
-        for (run, _) in runs.iter().zip(&to_do.each).filter(|(_, waits)| **waits) {
-            if !self.do_one(run, shown, &mut held)? {
-                return Ok(false);
-            }
-        }
-        let mut waiting = Waiting::new();
-        while let Some((run, holder)) = held.first() {
-            if self.stop.load(Ordering::Relaxed) {
-                return Ok(false);
-            }
-            waiting.wait_for(run, || {
-                shown.waits(run, &run.directory(self.directory), holder.as_ref());
-            });
-            let number = held.len();
-            for (run, _) in std::mem::take(&mut held) {
-                if !self.do_one(run, shown, &mut held)? {
-                    return Ok(false);
-                }
-            }
-            if held.len() < number {
-                waiting.one_ended();
-            }
-        }
-        Ok(true)
-    }
-
-    /// Evolves on until a run has the structure that an experiment is about; false if interrupted.
-    fn search(&mut self, asked: &Resilience) -> anyhow::Result<bool> {
-        let shown = SearchProgress::start(self.mode, &asked.name);
-        let ended = self.search_shown(asked, &shown);
-        shown.end();
-        ended
-    }
-
-    fn search_shown(&mut self, asked: &Resilience, shown: &SearchProgress) -> anyhow::Result<bool> {
-        let (mut after, mut begun) = (0, 0);
-        let mut waiting = Waiting::new();
-        loop {
-            let next = look(self.plan, asked, self.directory, after, &mut self.damaged);
-            let Search::Next(run, number) = next else {
-                return Ok(true);
-            };
-            let directory = run.directory(self.directory);
-            if self.damaged.contains(&directory) {
-                return Ok(true);
-            }
-            if begun != number {
-                shown.begins(&run, number, &asked.name);
-                begun = number;
-            }
-            match self.work_on(&run, |_| {})? {
-                Some(Worked::Completed) => after = number - 1,
-                // Another process searches, too, and its run decides whether more are needed.
-                Some(Worked::Held(_)) if self.stop.load(Ordering::Relaxed) => return Ok(false),
-                Some(Worked::Held(holder)) => waiting.wait_for(&run, || {
-                    shown.waits(&run, &directory, holder.as_ref());
-                }),
-                Some(Worked::Interrupted) => return Ok(false),
-                // It is damaged, so nobody knows whether more are needed.
-                None => return Ok(true),
-            }
-        }
-    }
-}
-
-/// The lines of `hashes.txt`, one a run that is done: its name and its hash. The SHA-256 of all
-/// lines is the hash of the suite.
-fn each_hash(
-    runs: Runs<'_>,
-    directory: &Path,
-    damaged: &mut DamagedRuns,
-    mut take: impl FnMut(&str),
-) {
-    for run in runs.iter() {
-        let directory = run.directory(directory);
-        if let Some(finished) = damaged.read(&directory) {
-            // What a process left that was killed at the very end; the directory need not be ours.
-            let _ = tidy(&directory);
-            take(&format!("{} {}\n", run.id, finished.hash));
-        }
-    }
 }
 
 #[cfg(test)]

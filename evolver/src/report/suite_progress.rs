@@ -3,6 +3,7 @@
 use super::progress::{ProgressMode, Shown, seconds};
 use crate::output::for_stderr;
 use crate::suite::plan::{Plan, PlannedRun};
+use crate::suite::worker::Watch;
 use indicatif::ProgressBar;
 use minimal_surprise_evolution::lock::{self, Holder};
 use minimal_surprise_evolution::settings::add_seed;
@@ -43,72 +44,6 @@ impl<'a> SuiteProgress<'a> {
             left: Cell::new(left),
             settled: RefCell::default(),
         }
-    }
-
-    /// A run begins, or is gone on with.
-    pub fn begins(&self, run: &PlannedRun) {
-        if let Shown::Bar(bar) = &self.shown {
-            bar.set_message(for_stderr(&self.label(run)).into_owned());
-        }
-    }
-
-    /// A run has done so many generations.
-    pub fn generation(&self, run: &PlannedRun, generation: u32) {
-        self.worked
-            .set(self.worked.get() + run.settings.robot_steps_per_generation());
-        self.settle(run, generation);
-        match &self.shown {
-            Shown::Bar(bar) => bar.set_message(format!(
-                "{}  generation {generation}/{}{}",
-                for_stderr(&self.label(run)),
-                run.settings.generations(),
-                self.left_in_words()
-            )),
-            Shown::Json => show_event!(
-                "{}",
-                serde_json::json!({
-                    "event": "generation",
-                    "run": run.id,
-                    "label": self.label(run),
-                    "generation": generation,
-                    "generations": run.settings.generations(),
-                })
-            ),
-            Shown::Lines | Shown::Nothing => {}
-        }
-    }
-
-    /// A run is complete.
-    pub fn completed(&self, run: &PlannedRun) {
-        self.completed.set(self.completed.get() + 1);
-        self.settle(run, run.settings.generations());
-        let done = self.done_before + self.completed.get();
-        match &self.shown {
-            Shown::Bar(bar) => bar.set_position(done),
-            Shown::Lines => tell!(
-                "{done}/{} runs  {}{}",
-                self.runs,
-                self.label(run),
-                self.left_in_words()
-            ),
-            Shown::Json => show_event!(
-                "{}",
-                serde_json::json!({
-                    "event": "run",
-                    "run": run.id,
-                    "label": self.label(run),
-                    "runs_done": done,
-                    "runs": self.runs,
-                    "seconds_left": self.left().map(|left| left.as_secs_f64()),
-                })
-            ),
-            Shown::Nothing => {}
-        }
-    }
-
-    /// A run in this directory is waited for, since another process works on it.
-    pub fn waits(&self, run: &PlannedRun, directory: &Path, holder: Option<&Holder>) {
-        waits(&self.shown, run, directory, holder);
     }
 
     /// Clears the bar.
@@ -152,10 +87,75 @@ impl<'a> SuiteProgress<'a> {
     }
 }
 
+impl Watch for SuiteProgress<'_> {
+    fn begins(&self, run: &PlannedRun, _further: Option<u32>) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.set_message(for_stderr(&self.label(run)).into_owned());
+        }
+    }
+
+    fn generation(&self, run: &PlannedRun, generation: u32) {
+        self.worked
+            .set(self.worked.get() + run.settings.robot_steps_per_generation());
+        self.settle(run, generation);
+        match &self.shown {
+            Shown::Bar(bar) => bar.set_message(format!(
+                "{}  generation {generation}/{}{}",
+                for_stderr(&self.label(run)),
+                run.settings.generations(),
+                self.left_in_words()
+            )),
+            Shown::Json => show_event!(
+                "{}",
+                serde_json::json!({
+                    "event": "generation",
+                    "run": run.id,
+                    "label": self.label(run),
+                    "generation": generation,
+                    "generations": run.settings.generations(),
+                })
+            ),
+            Shown::Lines | Shown::Nothing => {}
+        }
+    }
+
+    fn completed(&self, run: &PlannedRun) {
+        self.completed.set(self.completed.get() + 1);
+        self.settle(run, run.settings.generations());
+        let done = self.done_before + self.completed.get();
+        match &self.shown {
+            Shown::Bar(bar) => bar.set_position(done),
+            Shown::Lines => tell!(
+                "{done}/{} runs  {}{}",
+                self.runs,
+                self.label(run),
+                self.left_in_words()
+            ),
+            Shown::Json => show_event!(
+                "{}",
+                serde_json::json!({
+                    "event": "run",
+                    "run": run.id,
+                    "label": self.label(run),
+                    "runs_done": done,
+                    "runs": self.runs,
+                    "seconds_left": self.left().map(|left| left.as_secs_f64()),
+                })
+            ),
+            Shown::Nothing => {}
+        }
+    }
+
+    fn waits(&self, run: &PlannedRun, directory: &Path, holder: Option<&Holder>) {
+        waits(&self.shown, run, directory, holder);
+    }
+}
+
 /// Shows runs beyond a plan, of which nobody knows how many there will be.
 #[derive(Debug)]
 pub struct SearchProgress {
     shown: Shown,
+    experiment: String,
 }
 
 impl SearchProgress {
@@ -166,11 +166,21 @@ impl SearchProgress {
         let bar = || ProgressBar::no_length().with_prefix(prefix);
         Self {
             shown: Shown::new(mode, "{prefix}: {pos} runs beyond the plan", bar),
+            experiment: experiment.to_owned(),
         }
     }
 
-    /// A run begins, the so many-th beyond the plan.
-    pub fn begins(&self, run: &PlannedRun, number: u32, experiment: &str) {
+    /// Clears the bar.
+    pub fn end(&self) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Watch for SearchProgress {
+    fn begins(&self, run: &PlannedRun, further: Option<u32>) {
+        let (experiment, number) = (&self.experiment, further.unwrap_or(0));
         let label = &run.label;
         match &self.shown {
             Shown::Bar(bar) => {
@@ -196,16 +206,8 @@ impl SearchProgress {
         }
     }
 
-    /// A run in this directory is waited for, since another process works on it.
-    pub fn waits(&self, run: &PlannedRun, directory: &Path, holder: Option<&Holder>) {
+    fn waits(&self, run: &PlannedRun, directory: &Path, holder: Option<&Holder>) {
         waits(&self.shown, run, directory, holder);
-    }
-
-    /// Clears the bar.
-    pub fn end(&self) {
-        if let Shown::Bar(bar) = &self.shown {
-            bar.finish_and_clear();
-        }
     }
 }
 
@@ -228,12 +230,6 @@ fn waits(shown: &Shown, run: &PlannedRun, directory: &Path, holder: Option<&Hold
         }
         Shown::Lines | Shown::Nothing => say(),
     }
-}
-
-/// The robot-steps of a whole run.
-#[must_use]
-pub fn robot_steps(run: &PlannedRun) -> u64 {
-    until(run, run.settings.generations())
 }
 
 fn until(run: &PlannedRun, generation: u32) -> u64 {
@@ -264,7 +260,7 @@ mod tests {
         let plan = Plan::new(&suite, None, None, false).unwrap();
         let runs: Vec<_> = plan.runs().iter().collect();
         let (small, large) = (&runs[0], &runs[1]);
-        let all = runs.iter().map(robot_steps).sum();
+        let all = runs.iter().map(|run| run.settings.robot_steps()).sum();
         let shown = SuiteProgress::start(ProgressMode::None, &plan, 2, 2, all);
         assert_eq!(shown.left(), None, "nothing is known yet");
         for generation in 1..=4 {

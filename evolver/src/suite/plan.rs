@@ -8,10 +8,10 @@
 //! earlier settings have; runs are made one by one as they are asked for, so that a plan of a
 //! million runs, or a share of it, takes no more memory than one of ten.
 
-use super::{Experiment, FREE, Suite, check_combinations, check_seeds};
-use minimal_surprise_controller::Prediction;
+use super::experiment::Experiment;
+use super::file::{Suite, check_combinations, check_seeds};
 use minimal_surprise_evolution::run_id::run_id;
-use minimal_surprise_evolution::settings::{Overrides, SettingError, Settings, model_name};
+use minimal_surprise_evolution::settings::{SettingError, Settings};
 use minimal_surprise_evolution::text::hex;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -106,9 +106,12 @@ impl PlannedExperiment {
     /// # Panics
     /// If there are not so many. All settings were checked when the plan was made.
     fn combination(&self, combination: u64) -> PlannedSettings {
-        let settings = combination_of(&self.asked, combination).expect("settings were checked");
+        let settings = self
+            .asked
+            .settings(combination)
+            .expect("settings were checked");
         PlannedSettings {
-            label: label(&settings, &self.asked),
+            label: self.asked.label(&settings),
             settings,
             number: self.asked.runs,
             experiment: self.index,
@@ -259,10 +262,8 @@ impl Plan {
         };
         let mut experiments = Vec::new();
         for (index, experiment) in suite.experiments.iter().filter(wanted).enumerate() {
-            let asked = Experiment {
-                runs: runs.unwrap_or(experiment.runs),
-                ..experiment.clone()
-            };
+            let mut asked = experiment.clone();
+            asked.runs = runs.unwrap_or(asked.runs);
             experiments.push(PlannedExperiment {
                 name: experiment.name.clone(),
                 index,
@@ -324,7 +325,7 @@ fn different(experiments: &[PlannedExperiment]) -> Result<Vec<SeedRange>, Settin
     for experiment in experiments {
         for combination in 0..experiment.asked.combinations() {
             // What the settings are without their seed.
-            let settings = combination_of(&experiment.asked, combination)?.with_seed(0);
+            let settings = experiment.asked.settings(combination)?.with_seed(0);
             names.push((run_id(&settings), ranges.len()));
             ranges.push(SeedRange {
                 experiment: experiment.index as u32,
@@ -374,69 +375,6 @@ fn without(seeds: Range<u64>, others: &[Range<u64>]) -> Vec<Range<u64>> {
             .filter(|part| !part.is_empty())
             .collect()
     })
-}
-
-/// What distinguishes settings, in words: model, predictions, grid, swarm size and noise, and
-/// whatever else the experiment has several values of.
-fn label(settings: &Settings, experiment: &Experiment) -> String {
-    let (scenario, noise) = (settings.scenario(), settings.noise());
-    let model = model_name(settings.topology().model()).to_uppercase();
-    let mut label = format!("{model}, {}", scenario.grid());
-    match settings.topology().prediction() {
-        Prediction::Free => {}
-        Prediction::Predefined(template) => label += &format!(", {} predefined", template.name()),
-        Prediction::PartlyPredefined(template) => {
-            label += &format!(", {} partly predefined", template.name());
-        }
-    }
-    if scenario.robots() != 100 {
-        label += &format!(", {} robots", scenario.robots());
-    }
-    if noise != 0.0 {
-        label += &format!(", {} % noise", 100.0 * noise);
-    }
-    for (setting, values) in experiment.lists() {
-        if values.len() > 1 && !LABELLED.contains(&setting.name) {
-            let value = settings.value(setting.name);
-            let value = value.map_or_else(|| setting.default.to_owned(), |v| v.to_string());
-            label += &format!(", {} {value}", setting.name);
-        }
-    }
-    label
-}
-
-/// Settings that every label has.
-const LABELLED: [&str; 4] = ["grid", "robots", "sensor-model", "noise"];
-
-/// Every combination of an experiment's settings, with its first seed.
-pub fn settings_of(
-    experiment: &Experiment,
-) -> impl Iterator<Item = Result<Settings, SettingError>> {
-    (0..experiment.combinations()).map(|combination| combination_of(experiment, combination))
-}
-
-/// The settings of one combination: noise varies fastest, then robots, grids, predictions, models,
-/// then whatever else is listed.
-fn combination_of(experiment: &Experiment, combination: u64) -> Result<Settings, SettingError> {
-    let mut rest = combination;
-    let mut next = |values: usize| {
-        let index = rest % values as u64;
-        rest /= values as u64;
-        index as usize
-    };
-    let mut overrides = Overrides::default();
-    for (setting, values) in experiment.lists() {
-        overrides.flag(setting.name, Some(&values[next(values.len())]));
-        if setting.name == "grid" {
-            let prediction = &experiment.predictions[next(experiment.predictions.len())];
-            match prediction.strip_prefix("partly-") {
-                Some(template) => overrides.flag("predefine-partly", Some(template)),
-                None if prediction == FREE => {}
-                None => overrides.flag("predefine", Some(prediction)),
-            }
-        }
-    }
-    Settings::resolve(&overrides, || experiment.first_seed)
 }
 
 #[cfg(test)]

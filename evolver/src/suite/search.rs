@@ -4,7 +4,7 @@
 //! that follow are run, of all settings in turn, until one is; its place in that order says how many
 //! it took, whoever has done them.
 
-use super::Resilience;
+use super::file::Resilience;
 use super::plan::{Plan, PlannedRun};
 use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_sim::{Structure, classify};
@@ -79,7 +79,7 @@ fn has(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::suite::work::{Worked, work_on};
+    use crate::suite::work::{Outcome, work_on};
     use crate::suite::{Suite, plan::PlannedRun};
     use minimal_surprise_evolution::finished_run::FinishedRun;
     use std::collections::BTreeSet;
@@ -114,7 +114,7 @@ mod tests {
 
     fn done(run: &PlannedRun, directory: &Path) {
         let worked = work_on(run, directory, &AtomicBool::new(false), |_| {});
-        assert_eq!(worked.unwrap(), Worked::Completed);
+        assert_eq!(worked.unwrap(), Outcome::Completed);
     }
 
     fn names(run: &PlannedRun, directory: &Path) -> Vec<Structure> {

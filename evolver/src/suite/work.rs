@@ -76,14 +76,14 @@ pub fn progress(run: &PlannedRun, suite: &Path) -> Result<Progress, ReadRunError
     })
 }
 
-/// What became of a run that was to be done.
+/// The result of work on a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Worked {
+pub enum Outcome {
     /// It is complete now.
     Completed,
     /// Another process has it; its lock may say which.
     Held(Option<Holder>),
-    /// It was interrupted, and can be gone on with.
+    /// It was interrupted, and can be resumed.
     Interrupted,
 }
 
@@ -142,25 +142,25 @@ pub fn work_on(
     suite: &Path,
     stop: &AtomicBool,
     each_generation: impl FnMut(u32),
-) -> Result<Worked, RunDirError> {
-    match begin_or_go_on(run, suite, stop, each_generation) {
+) -> Result<Outcome, RunDirError> {
+    match begin_or_resume(run, suite, stop, each_generation) {
         // Another process did the same run, unseen for lack of locks, and tidied up after both.
-        Err(_) if matches!(progress(run, suite), Ok(Progress::Done)) => Ok(Worked::Completed),
+        Err(_) if matches!(progress(run, suite), Ok(Progress::Done)) => Ok(Outcome::Completed),
         worked => worked,
     }
 }
 
-fn begin_or_go_on(
+fn begin_or_resume(
     run: &PlannedRun,
     suite: &Path,
     stop: &AtomicBool,
     mut each_generation: impl FnMut(u32),
-) -> Result<Worked, RunDirError> {
+) -> Result<Outcome, RunDirError> {
     let directory = run.directory(suite);
     let (mut experiment, held) = match open(run, &directory) {
         Ok(Some(opened)) => opened,
-        Ok(None) => return Ok(Worked::Completed),
-        Err(RunDirError::InUse { holder, .. }) => return Ok(Worked::Held(holder)),
+        Ok(None) => return Ok(Outcome::Completed),
+        Err(RunDirError::InUse { holder, .. }) => return Ok(Outcome::Held(holder)),
         Err(error) => return Err(error),
     };
     let path = CodePath::from_environment()?;
@@ -174,14 +174,14 @@ fn begin_or_go_on(
         },
     )?;
     if !finished {
-        return Ok(Worked::Interrupted);
+        return Ok(Outcome::Interrupted);
     }
     let finding = experiment
         .finding()
         .expect("a trial fits its own grid")
         .expect("an evolution has at least one generation");
     held.finish(&experiment, &finding)?;
-    Ok(Worked::Completed)
+    Ok(Outcome::Completed)
 }
 
 /// The run as it stands, held by this process; none if it is complete.
@@ -265,7 +265,7 @@ mod tests {
         fs::remove_file(directory.join(".lock")).unwrap();
         assert_eq!(
             work_on(&run, &suite, &stop, |_| {}).unwrap(),
-            Worked::Completed
+            Outcome::Completed
         );
         while !slower.is_finished() {
             slower

@@ -262,7 +262,7 @@ impl Report {
     /// # Errors
     /// [`ReportError`] if a figure cannot be drawn.
     pub fn of(gathered: &Gathered, suite: &Suite, called: &str) -> Result<Self, ReportError> {
-        let paper = PaperValues::for_suite(suite.built_in);
+        let paper = PaperValues::for_suite(suite.compare_with);
         let mut tables = tables::all(gathered, &paper);
         let mut figures = figures::all(gathered, &paper)?;
         let mut taken = OTHER_FILES.map(str::to_owned).into();
@@ -556,7 +556,7 @@ fn csv_text(rows: &[impl Serialize]) -> String {
 mod tests {
     use super::*;
     use crate::suite::plan::Plan;
-    use crate::suite::work::{Worked, work_on};
+    use crate::suite::work::{Outcome, work_on};
     use minimal_surprise_evolution::finished_run::FinishedRun;
     use minimal_surprise_evolution::reevaluation::median;
     use std::collections::BTreeMap;
@@ -655,7 +655,7 @@ mod tests {
         let further: Vec<_> = plan.experiments[0].further().take(2).collect();
         for run in plan.runs().iter().chain(further.clone()) {
             let worked = work_on(&run, scratch.path(), &AtomicBool::new(false), |_| {});
-            assert_eq!(worked.unwrap(), Worked::Completed);
+            assert_eq!(worked.unwrap(), Outcome::Completed);
         }
         let out = scratch.path().join("report");
         let written = report_of(&plan, &suite, scratch.path(), &out, "evolver");
@@ -691,7 +691,7 @@ mod tests {
         let plan = Plan::new(&suite, None, None, false).unwrap();
         for run in plan.runs().iter() {
             let worked = work_on(&run, scratch.path(), &AtomicBool::new(false), |_| {});
-            assert_eq!(worked.unwrap(), Worked::Completed);
+            assert_eq!(worked.unwrap(), Outcome::Completed);
         }
         let out = scratch.path().join("report");
         report_of(&plan, &suite, scratch.path(), &out, "evolver");
@@ -732,7 +732,7 @@ mod tests {
         let (last, others) = runs.split_last().unwrap();
         for run in others {
             let worked = work_on(run, &directory, &AtomicBool::new(false), |_| {});
-            assert_eq!(worked.unwrap(), Worked::Completed);
+            assert_eq!(worked.unwrap(), Outcome::Completed);
         }
         assert!(!last.directory(&directory).exists());
 

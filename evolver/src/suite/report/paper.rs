@@ -1,5 +1,6 @@
 //! The paper's numbers, from `paper-values.toml`.
 
+use crate::suite::Reference;
 use minimal_surprise_sim::structures::Structure;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -219,10 +220,13 @@ pub struct Raised {
 impl PaperValues {
     /// The paper's numbers for a suite: all for the paper's, none for another.
     #[must_use]
-    pub fn for_suite(built_in: bool) -> Self {
+    pub fn for_suite(reference: Option<Reference>) -> Self {
         let all: Self = toml::from_str(include_str!("../paper-values.toml"))
             .expect("a test reads the file that is built in");
-        if built_in { all } else { Self::none() }
+        match reference {
+            Some(Reference::Paper) => all,
+            None => Self::none(),
+        }
     }
 
     fn none() -> Self {
@@ -281,7 +285,7 @@ mod tests {
     fn every_number_belongs_to_a_setting_of_the_papers_suite() {
         let suite = Suite::paper().unwrap();
         let plan = Plan::new(&suite, None, None, false).unwrap();
-        let values = PaperValues::for_suite(true);
+        let values = PaperValues::for_suite(Some(Reference::Paper));
         let exists = |experiment: &str, setting: &str| {
             let found = plan.experiments.iter().any(|planned| {
                 planned.name == experiment && planned.settings().any(|s| s.label == setting)
@@ -317,7 +321,7 @@ mod tests {
 
     #[test]
     fn tied_runs_of_the_paper_count_for_the_first_structure() {
-        let values = PaperValues::for_suite(true);
+        let values = PaperValues::for_suite(Some(Reference::Paper));
         let names = ["line", "pair", "clustering", "random dispersion"].map(str::to_owned);
         let runs = |experiment: &str| {
             let found = values.distribution(Of::Structures, experiment, "C, 20x20");

@@ -1,0 +1,238 @@
+//! An experiment of a suite: the table `[[experiment]]`, and its combinations of settings.
+//!
+//! Besides its own keys the table has one for every setting that a suite may list, with one value or
+//! several.
+
+use minimal_surprise_controller::Prediction;
+use minimal_surprise_evolution::settings::{
+    Overrides, SETTINGS, Setting, SettingError, Settings, model_name, setting,
+};
+use serde::de::{Error, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Evolutions under every combination of the listed values of settings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// Its name.
+    pub name: String,
+    /// Runs of every combination, seeds from [`Experiment::first_seed`] on.
+    pub runs: u32,
+    /// Predictions: `free`, the name of a template, or `partly-line`.
+    pub predictions: Vec<String>,
+    /// Seed of the first run.
+    pub first_seed: u64,
+    /// Whether it is left out unless it is asked for by name.
+    pub optional: bool,
+    /// Values of other settings, by their names.
+    values: BTreeMap<&'static str, Vec<String>>,
+}
+
+/// Predictions that no template fixes.
+const FREE: &str = "free";
+
+/// Settings that every label has.
+const LABELLED: [&str; 4] = ["grid", "robots", "sensor-model", "noise"];
+
+impl Experiment {
+    /// The settings that it gives values of, the fastest varying first, with these values.
+    pub fn lists(&self) -> impl Iterator<Item = (&'static Setting, &[String])> {
+        let first = ["noise", "robots", "grid", "sensor-model"];
+        let others = self.values.keys().copied();
+        let others = others.filter(move |name| !first.contains(name));
+        let names = first.into_iter().chain(others);
+        names.filter_map(|name| Some((setting(name)?, self.values.get(name)?.as_slice())))
+    }
+
+    /// Number of combinations of the listed values.
+    pub(super) fn combinations(&self) -> u64 {
+        self.lists()
+            .map(|(_, values)| values.len())
+            .chain([self.predictions.len()])
+            .fold(1, |product, values| product.saturating_mul(values as u64))
+    }
+
+    pub(super) fn smallest_swarm(&self) -> Option<u32> {
+        let robots = self.values.get("robots")?.iter();
+        robots.filter_map(|robots| robots.parse().ok()).min()
+    }
+
+    /// The settings of one combination: noise varies fastest, then robots, grids, predictions, models,
+    /// then whatever else is listed.
+    pub(super) fn settings(&self, combination: u64) -> Result<Settings, SettingError> {
+        let mut rest = combination;
+        let mut next = |values: usize| {
+            let index = rest % values as u64;
+            rest /= values as u64;
+            index as usize
+        };
+        let mut overrides = Overrides::default();
+        for (setting, values) in self.lists() {
+            overrides.flag(setting.name, Some(&values[next(values.len())]));
+            if setting.name == "grid" {
+                let prediction = &self.predictions[next(self.predictions.len())];
+                match prediction.strip_prefix("partly-") {
+                    Some(template) => overrides.flag("predefine-partly", Some(template)),
+                    None if prediction == FREE => {}
+                    None => overrides.flag("predefine", Some(prediction)),
+                }
+            }
+        }
+        Settings::resolve(&overrides, || self.first_seed)
+    }
+
+    /// What distinguishes settings, in words: model, predictions, grid, swarm size and noise, and
+    /// whatever else the experiment has several values of.
+    pub(super) fn label(&self, settings: &Settings) -> String {
+        let (scenario, noise) = (settings.scenario(), settings.noise());
+        let model = model_name(settings.topology().model()).to_uppercase();
+        let mut label = format!("{model}, {}", scenario.grid());
+        match settings.topology().prediction() {
+            Prediction::Free => {}
+            Prediction::Predefined(template) => {
+                label += &format!(", {} predefined", template.name())
+            }
+            Prediction::PartlyPredefined(template) => {
+                label += &format!(", {} partly predefined", template.name());
+            }
+        }
+        if scenario.robots() != 100 {
+            label += &format!(", {} robots", scenario.robots());
+        }
+        if noise != 0.0 {
+            label += &format!(", {} % noise", 100.0 * noise);
+        }
+        for (setting, values) in self.lists() {
+            if values.len() > 1 && !LABELLED.contains(&setting.name) {
+                let value = settings.value(setting.name);
+                let value = value.map_or_else(|| setting.default.to_owned(), |v| v.to_string());
+                label += &format!(", {} {value}", setting.name);
+            }
+        }
+        label
+    }
+}
+
+/// Keys that are no settings.
+const OWN: [&str; 5] = ["name", "runs", "predictions", "first-seed", "optional"];
+
+/// Settings that every experiment lists, because runs are labelled with them.
+const ALWAYS: [&str; 4] = ["grid", "robots", "sensor-model", "noise"];
+
+/// A key of an experiment.
+enum Key {
+    Own(&'static str),
+    Setting(&'static str),
+}
+
+impl<'de> Deserialize<'de> for Key {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let key = String::deserialize(deserializer)?;
+        let own = OWN.into_iter().find(|own| *own == key).map(Self::Own);
+        let mut lists = SETTINGS.iter().filter(|setting| !setting.list.is_empty());
+        let found = own.or_else(|| {
+            let setting = lists.clone().find(|setting| setting.list == key);
+            setting.map(|setting| Self::Setting(setting.name))
+        });
+        found.ok_or_else(|| {
+            let keys: Vec<&str> = OWN
+                .into_iter()
+                .chain(lists.by_ref().map(|s| s.list))
+                .collect();
+            D::Error::custom(format!("unknown key `{key}`; keys are {}", keys.join(", ")))
+        })
+    }
+}
+
+/// One value or several, as text.
+struct Values(Vec<String>);
+
+impl<'de> Deserialize<'de> for Values {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ValuesVisitor)
+    }
+}
+
+struct ValuesVisitor;
+
+impl<'de> Visitor<'de> for ValuesVisitor {
+    type Value = Values;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, a string, or a list of them")
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<Values, E> {
+        Ok(Values(vec![value.to_owned()]))
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<Values, E> {
+        Ok(Values(vec![value.to_string()]))
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<Values, E> {
+        Ok(Values(vec![value.to_string()]))
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<Values, E> {
+        Ok(Values(vec![value.to_string()]))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Values, A::Error> {
+        let mut values = Vec::new();
+        while let Some(Values(value)) = sequence.next_element()? {
+            match <[String; 1]>::try_from(value) {
+                Ok([value]) => values.push(value),
+                Err(_) => return Err(A::Error::custom("a list in a list")),
+            }
+        }
+        Ok(Values(values))
+    }
+}
+
+impl<'de> Deserialize<'de> for Experiment {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(ExperimentVisitor)
+    }
+}
+
+struct ExperimentVisitor;
+
+impl<'de> Visitor<'de> for ExperimentVisitor {
+    type Value = Experiment;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an experiment")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut table: A) -> Result<Experiment, A::Error> {
+        let (mut name, mut runs) = (None, None);
+        let (mut first_seed, mut optional) = (1, false);
+        let mut predictions = vec![FREE.to_owned()];
+        let defaults = SETTINGS.iter().filter(|s| ALWAYS.contains(&s.name));
+        let mut values: BTreeMap<_, _> = defaults
+            .map(|setting| (setting.name, vec![setting.default.to_owned()]))
+            .collect();
+        while let Some(key) = table.next_key()? {
+            match key {
+                Key::Own("name") => name = Some(table.next_value()?),
+                Key::Own("runs") => runs = Some(table.next_value()?),
+                Key::Own("first-seed") => first_seed = table.next_value()?,
+                Key::Own("optional") => optional = table.next_value()?,
+                Key::Own(_) => predictions = table.next_value::<Values>()?.0,
+                Key::Setting(setting) => {
+                    values.insert(setting, table.next_value::<Values>()?.0);
+                }
+            }
+        }
+        Ok(Experiment {
+            name: name.ok_or_else(|| A::Error::missing_field("name"))?,
+            runs: runs.ok_or_else(|| A::Error::missing_field("runs"))?,
+            predictions,
+            first_seed,
+            optional,
+            values,
+        })
+    }
+}
