@@ -1,6 +1,6 @@
 //! An experiment: evolution and world together, a generation at a time.
 
-use crate::generation_work::Work;
+use crate::generation_work::GenerationWork;
 use crate::population::{Population, best_slot};
 use crate::ranges;
 use crate::run_hash::RunHash;
@@ -56,7 +56,7 @@ pub struct Experiment {
 /// What an evolution results in: the last generation's best genome, run once more from where it
 /// had its fitness.
 #[derive(Clone, Debug)]
-pub struct Finding {
+pub struct EvolutionResult {
     /// The genome.
     pub genome: Genome,
     /// Where it comes from.
@@ -77,7 +77,7 @@ pub struct Finding {
     pub hash: RunHash,
 }
 
-impl Finding {
+impl EvolutionResult {
     /// Share of robots in the structure that the run is named after, 0 to 1.
     #[must_use]
     pub fn share(&self) -> f64 {
@@ -146,7 +146,7 @@ impl Experiment {
         let trials: Vec<Trial> = (0..self.settings.repetitions())
             .map(|repetition| scenario.trial(seeds, generation, repetition))
             .collect();
-        let work = Work::new(
+        let work = GenerationWork::new(
             scenario,
             self.settings.topology(),
             trials,
@@ -196,7 +196,7 @@ impl Experiment {
     ///
     /// # Errors
     /// [`WorldError`] if the trial does not fit its own grid.
-    pub fn finding(&self) -> Result<Option<Finding>, WorldError> {
+    pub fn finding(&self) -> Result<Option<EvolutionResult>, WorldError> {
         let (Some(record), Some(genome)) = (self.history.last(), &self.best) else {
             return Ok(None);
         };
@@ -211,7 +211,7 @@ impl Experiment {
             measures.observe(world);
             steps_hash.observe(world);
         })?;
-        Ok(Some(Finding {
+        Ok(Some(EvolutionResult {
             genome: genome.clone(),
             provenance: Provenance {
                 seed: Some(self.settings.seed()),

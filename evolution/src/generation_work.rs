@@ -13,7 +13,7 @@ const HALVED: usize = 8;
 
 /// The evaluations of a generation.
 #[derive(Debug)]
-pub struct Work<'a> {
+pub struct GenerationWork<'a> {
     genomes: &'a [Genome],
     whole: TrialSet,
     /// The same trials in two parts, each with the number of its first repetition.
@@ -28,7 +28,7 @@ struct Task {
     half: Option<usize>,
 }
 
-impl<'a> Work<'a> {
+impl<'a> GenerationWork<'a> {
     /// The genomes of a generation and the trials that they share.
     ///
     /// # Panics
@@ -157,7 +157,7 @@ mod tests {
                 .iter()
                 .map(|genome| evaluate(genome, &scenario, &trials))
                 .collect();
-            let work = Work::new(&scenario, topology, trials, &genomes);
+            let work = GenerationWork::new(&scenario, topology, trials, &genomes);
             let go_on = AtomicBool::new(false);
             let evaluations = work.evaluate(Engine::Fast, Path::best(), &go_on);
             assert_eq!(evaluations, Some(expected));

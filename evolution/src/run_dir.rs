@@ -3,7 +3,7 @@
 //! No directory is used twice, and no file in it is ever half-written.
 
 use crate::checkpoint::{self, CheckpointError};
-use crate::experiment::{Experiment, Finding};
+use crate::experiment::{EvolutionResult, Experiment};
 use crate::files::{self, FileError};
 use crate::finished_run::{ReadRunError, complete, settings_and_text_of_run};
 use crate::limits::{self, Needs, TooMuch};
@@ -115,7 +115,7 @@ impl RunDirError {
 
 /// What `--resume` finds.
 #[derive(Debug)]
-pub enum Found {
+pub enum Opened {
     /// A run to go on with.
     Unfinished(Box<Experiment>, RunDir),
     /// A run that is complete, with its hash.
@@ -181,13 +181,13 @@ impl RunDir {
     /// # Errors
     /// [`RunDirError`] if there is no run, it is in use, it was changed or damaged, or it takes more
     /// than this machine has.
-    pub fn open(path: &Path, threads: f64) -> Result<Found, RunDirError> {
+    pub fn open(path: &Path, threads: f64) -> Result<Opened, RunDirError> {
         let missing = |missing| RunDirError::NotARun {
             path: path.to_owned(),
             missing,
         };
         if let Some(hash) = finished(path)? {
-            return Ok(Found::Finished(hash));
+            return Ok(Opened::Finished(hash));
         }
         let config = path.join(CONFIG);
         if !files::exists(&config)? {
@@ -198,7 +198,7 @@ impl RunDir {
         let lock = lock(path)?;
         // Once more: who had the lock until now may have completed it.
         if let Some(hash) = finished(path)? {
-            return Ok(Found::Finished(hash));
+            return Ok(Opened::Finished(hash));
         }
         let (settings, settings_text) = settings_of_unfinished(path)?;
         Needs::of_evolution(&settings, threads).check_memory()?;
@@ -210,7 +210,7 @@ impl RunDir {
             table_last: false,
             _lock: Some(lock),
         };
-        Ok(Found::Unfinished(Box::new(experiment), run))
+        Ok(Opened::Unfinished(Box::new(experiment), run))
     }
 
     /// Whether a run that is not complete can be gone on with, where there is the memory for it.
@@ -271,7 +271,11 @@ impl RunDir {
     ///
     /// # Errors
     /// [`FileError`] if a file cannot be written; the run can then be resumed.
-    pub fn finish(&self, experiment: &Experiment, finding: &Finding) -> Result<(), FileError> {
+    pub fn finish(
+        &self,
+        experiment: &Experiment,
+        finding: &EvolutionResult,
+    ) -> Result<(), FileError> {
         let mut buffer = [0; CONTAINER_BYTES_MAX];
         let genome = codec::encode(&finding.genome, finding.provenance, &mut buffer)
             .expect("the buffer holds any genome");

@@ -11,7 +11,7 @@
 //! | `DONE` | the run's hash; the run is complete |
 //! | `checkpoint` | until the run is complete: the state from which it is resumed |
 
-use crate::experiment::{Experiment, Finding, GenerationRecord};
+use crate::experiment::{EvolutionResult, Experiment, GenerationRecord};
 use crate::ranges;
 use crate::settings::{Settings, model_name, seed_text};
 use minimal_surprise_controller::KERNEL_ID;
@@ -179,7 +179,7 @@ impl From<&Measures> for MeasuresOfRun {
 impl FinalFile {
     /// The file of a result.
     #[must_use]
-    pub fn new(settings: &Settings, finding: &Finding) -> Self {
+    pub fn new(settings: &Settings, finding: &EvolutionResult) -> Self {
         let scenario = settings.scenario();
         Self {
             schema_version: SCHEMA_VERSION,

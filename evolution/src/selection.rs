@@ -1,8 +1,10 @@
 //! Selection: which genomes become parents. All draws are of integers.
 
-use crate::settings::{COUNT_MAX, count};
 use minimal_surprise_sim::seed::{Stream, uniform_below};
 use std::fmt;
+
+/// Most genomes of a tournament.
+const TOURNAMENT_MAX: u32 = 1_000_000;
 
 /// How parents are chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,7 +25,12 @@ impl Selection {
     pub fn parse(text: &str) -> Result<Self, String> {
         match text.split_once(':') {
             None if text == "roulette" => Ok(Self::Roulette),
-            Some(("tournament", size)) => count(size, COUNT_MAX).map(Self::Tournament),
+            Some(("tournament", size)) => match size.parse() {
+                Ok(size) if (1..=TOURNAMENT_MAX).contains(&size) => Ok(Self::Tournament(size)),
+                _ => Err(format!(
+                    "expected tournament:K with K from 1 to {TOURNAMENT_MAX}"
+                )),
+            },
             _ => Err("expected roulette, or tournament:K as in tournament:3".to_owned()),
         }
     }

@@ -3,6 +3,7 @@
 use crate::exit::Exit;
 use crate::output;
 use crate::suite::report::ReportError;
+use crate::suite::report::gather::GatherError;
 use crate::suite::slurm::SubmitError;
 use crate::suite::worker::ToDoError;
 use minimal_surprise_evolution::damaged_runs::DamagedRuns;
@@ -158,6 +159,12 @@ impl AboutInput for GalleryError {
             Self::File(error) => error.is_bad_input(),
             Self::World { .. } | Self::Damaged(_) => false,
         }
+    }
+}
+
+impl AboutInput for GatherError {
+    fn is_bad_input(&self) -> bool {
+        matches!(self, Self::File(error) if error.is_bad_input())
     }
 }
 

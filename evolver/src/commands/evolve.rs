@@ -16,7 +16,7 @@ use minimal_surprise_evolution::files;
 use minimal_surprise_evolution::finished_run::FinishedRun;
 use minimal_surprise_evolution::limits::{self, Needs};
 use minimal_surprise_evolution::new_dir::remove_abandoned;
-use minimal_surprise_evolution::run_dir::{Found, RunDir};
+use minimal_surprise_evolution::run_dir::{Opened, RunDir};
 use minimal_surprise_evolution::settings::{
     DRAWN_SEED_MAX, Overrides, SettingError, Settings, add_seed,
 };
@@ -100,8 +100,8 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
     let (experiment, run) = match &arguments.resume {
         Some(directory) => {
             match RunDir::open(directory, limits::threads(threads)).map_err(unusable)? {
-                Found::Unfinished(experiment, run) => (*experiment, run),
-                Found::Finished(hash) => {
+                Opened::Unfinished(experiment, run) => (*experiment, run),
+                Opened::Finished(hash) => {
                     // All of it, or a damaged one would be called complete.
                     FinishedRun::read_and_check(directory).map_err(unusable)?;
                     if arguments.progress == ProgressMode::Json {

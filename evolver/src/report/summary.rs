@@ -6,7 +6,7 @@ use console::{Style, Term};
 use minimal_surprise_controller::codec::FORMAT_VERSION;
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{EncodedGenome, KERNEL_ID};
-use minimal_surprise_evolution::experiment::{Experiment, Finding};
+use minimal_surprise_evolution::experiment::{EvolutionResult, Experiment};
 use minimal_surprise_evolution::run_files::{BEST, CONFIG};
 use minimal_surprise_evolution::settings::{describe, model_name};
 use minimal_surprise_evolution::text::shell_path;
@@ -55,7 +55,7 @@ pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> S
 
 /// What an evolution came to, and what to do next.
 #[must_use]
-pub fn evolved(experiment: &Experiment, finding: &Finding, directory: &Path) -> String {
+pub fn evolved(experiment: &Experiment, finding: &EvolutionResult, directory: &Path) -> String {
     let settings = experiment.settings();
     let classified = Classified {
         grid: settings.scenario().grid(),

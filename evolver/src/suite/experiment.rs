@@ -14,10 +14,10 @@ use std::fmt;
 
 /// Evolutions under every combination of the listed values of settings.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Experiment {
+pub struct ExperimentTable {
     /// Its name.
     pub name: String,
-    /// Runs of every combination, seeds from [`Experiment::first_seed`] on.
+    /// Runs of every combination, seeds from [`ExperimentTable::first_seed`] on.
     pub runs: u32,
     /// Predictions: `free`, the name of a template, or `partly-line`.
     pub predictions: Vec<String>,
@@ -35,7 +35,7 @@ const FREE: &str = "free";
 /// Settings that every label has.
 const LABELLED: [&str; 4] = ["grid", "robots", "sensor-model", "noise"];
 
-impl Experiment {
+impl ExperimentTable {
     /// The settings that it gives values of, the fastest varying first, with these values.
     pub fn lists(&self) -> impl Iterator<Item = (&'static Setting, &[String])> {
         let first = ["noise", "robots", "grid", "sensor-model"];
@@ -191,7 +191,7 @@ impl<'de> Visitor<'de> for ValuesVisitor {
     }
 }
 
-impl<'de> Deserialize<'de> for Experiment {
+impl<'de> Deserialize<'de> for ExperimentTable {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_map(ExperimentVisitor)
     }
@@ -200,13 +200,13 @@ impl<'de> Deserialize<'de> for Experiment {
 struct ExperimentVisitor;
 
 impl<'de> Visitor<'de> for ExperimentVisitor {
-    type Value = Experiment;
+    type Value = ExperimentTable;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("an experiment")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut table: A) -> Result<Experiment, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut table: A) -> Result<ExperimentTable, A::Error> {
         let (mut name, mut runs) = (None, None);
         let (mut first_seed, mut optional) = (1, false);
         let mut predictions = vec![FREE.to_owned()];
@@ -226,7 +226,7 @@ impl<'de> Visitor<'de> for ExperimentVisitor {
                 }
             }
         }
-        Ok(Experiment {
+        Ok(ExperimentTable {
             name: name.ok_or_else(|| A::Error::missing_field("name"))?,
             runs: runs.ok_or_else(|| A::Error::missing_field("runs"))?,
             predictions,

@@ -1,6 +1,6 @@
 //! The file of a suite: what is to be evolved, evaluated again and damaged.
 
-use super::experiment::Experiment;
+use super::experiment::ExperimentTable;
 use minimal_surprise_evolution::files::{self, FileError, TEXT_BYTES_MAX};
 use minimal_surprise_evolution::text::{self, is_hidden};
 use minimal_surprise_sim::Structure;
@@ -20,7 +20,7 @@ pub struct Suite {
     pub compare_with: Option<Reference>,
     /// Its evolutions.
     #[serde(default, rename = "experiment")]
-    pub experiments: Vec<Experiment>,
+    pub experiments: Vec<ExperimentTable>,
     /// Its best genomes, run again from new starts.
     #[serde(default, rename = "re-evaluation")]
     pub reevaluations: Vec<Reevaluation>,
@@ -115,7 +115,10 @@ fn check_of(of: &str, names: &[&str]) -> Result<(), String> {
 const COMBINATIONS_MAX: u64 = 1_000_000;
 
 /// Adds an experiment's combinations to those before it.
-pub(super) fn check_combinations(experiment: &Experiment, sum: &mut u64) -> Result<(), String> {
+pub(super) fn check_combinations(
+    experiment: &ExperimentTable,
+    sum: &mut u64,
+) -> Result<(), String> {
     *sum = sum.saturating_add(experiment.combinations());
     if *sum <= COMBINATIONS_MAX {
         return Ok(());
@@ -138,7 +141,7 @@ pub(super) fn check_seeds(first_seed: u64, runs: u32) -> Result<(), String> {
 }
 
 /// Checks an experiment, and adds its combinations to those before it.
-fn check_experiment(experiment: &Experiment, combinations: &mut u64) -> Result<(), String> {
+fn check_experiment(experiment: &ExperimentTable, combinations: &mut u64) -> Result<(), String> {
     check_name(&experiment.name)?;
     check_count("runs", experiment.runs)?;
     for (setting, values) in experiment.lists() {
@@ -210,7 +213,7 @@ impl Resilience {
         Structure::ALL.into_iter().find(|s| s.name() == spaced)
     }
 
-    fn check(&self, experiments: &[Experiment]) -> Result<(), String> {
+    fn check(&self, experiments: &[ExperimentTable]) -> Result<(), String> {
         check_name(&self.name)?;
         let names: Vec<&str> = experiments.iter().map(|e| e.name.as_str()).collect();
         check_of(&self.of, &names)?;
@@ -230,7 +233,7 @@ impl Resilience {
         }
         let of = experiments.iter().filter(|e| e.name == self.of);
         // Some robot has to be left.
-        let smallest = of.filter_map(Experiment::smallest_swarm).min();
+        let smallest = of.filter_map(ExperimentTable::smallest_swarm).min();
         let most = smallest.map_or(0, |robots| robots - 1);
         for &robots in &self.robots_in_areas {
             if !(1..=most).contains(&robots) {

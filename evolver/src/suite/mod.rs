@@ -24,5 +24,5 @@ pub mod status;
 pub mod work;
 pub mod worker;
 
-pub use experiment::Experiment;
+pub use experiment::ExperimentTable;
 pub use file::{PAPER, Reevaluation, Reference, Resilience, Suite, SuiteError};

@@ -8,7 +8,7 @@
 //! earlier settings have; runs are made one by one as they are asked for, so that a plan of a
 //! million runs, or a share of it, takes no more memory than one of ten.
 
-use super::experiment::Experiment;
+use super::experiment::ExperimentTable;
 use super::file::{Suite, check_combinations, check_seeds};
 use minimal_surprise_evolution::run_id::run_id;
 use minimal_surprise_evolution::settings::{SettingError, Settings};
@@ -47,7 +47,7 @@ pub struct PlannedExperiment {
     /// Its place in the plan.
     index: usize,
     /// What is planned, with the number of runs asked for.
-    asked: Experiment,
+    asked: ExperimentTable,
 }
 
 /// The runs under the same settings.
@@ -256,7 +256,7 @@ impl Plan {
                 names: suite.experiments.iter().map(|e| e.name.clone()).collect(),
             });
         }
-        let wanted = |experiment: &&Experiment| match only {
+        let wanted = |experiment: &&ExperimentTable| match only {
             Some(name) => experiment.name == name,
             None => with_optional || !experiment.optional,
         };

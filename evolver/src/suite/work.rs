@@ -11,7 +11,7 @@ use minimal_surprise_evolution::experiment::Experiment;
 use minimal_surprise_evolution::files;
 use minimal_surprise_evolution::finished_run::{Progress, ReadRunError, complete};
 use minimal_surprise_evolution::lock::Holder;
-use minimal_surprise_evolution::run_dir::{Found, RunDir, RunDirError};
+use minimal_surprise_evolution::run_dir::{Opened, RunDir, RunDirError};
 use minimal_surprise_sim::{Engine, Path as CodePath};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -203,8 +203,8 @@ fn open(run: &PlannedRun, directory: &Path) -> Result<Option<(Experiment, RunDir
 fn found(directory: &Path) -> Result<Option<(Experiment, RunDir)>, RunDirError> {
     Ok(
         match RunDir::open(directory, rayon::current_num_threads() as f64)? {
-            Found::Finished(_) => None,
-            Found::Unfinished(experiment, held) => Some((*experiment, held.with_table_last())),
+            Opened::Finished(_) => None,
+            Opened::Unfinished(experiment, held) => Some((*experiment, held.with_table_last())),
         },
     )
 }

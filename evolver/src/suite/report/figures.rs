@@ -3,9 +3,9 @@
 //! In the report's page lines and letters have the colour of its text, so that a figure can be read
 //! on a light and on a dark page; a file of its own is dark on white.
 
-use super::gather::{Gathered, Group, Resilient, Run};
+use super::gather::{Gathered, GatheredRun, Group, Resilient};
+use super::numbers::{csv_text, plural};
 use super::paper::PaperValues;
-use super::plural;
 use super::statistics::quantile;
 use minimal_surprise_sim::structures::{LineOrientation, Structure, classify};
 use minimal_surprise_sim::{Grid, Heading, Pose};
@@ -232,7 +232,10 @@ impl Name {
 }
 
 /// The runs beyond the plan under a group's settings that have a structure that none of its own has.
-fn beyond_plan<'a>(gathered: &'a Gathered, group: &Group) -> Vec<(String, Structure, &'a Run)> {
+fn beyond_plan<'a>(
+    gathered: &'a Gathered,
+    group: &Group,
+) -> Vec<(String, Structure, &'a GatheredRun)> {
     let further = gathered.further_of(group);
     let mut found = further.map_or(Vec::new(), |group| one_of_each(group, By::Structure));
     found.retain(|(_, structure, _)| {
@@ -246,8 +249,8 @@ fn beyond_plan<'a>(gathered: &'a Gathered, group: &Group) -> Vec<(String, Struct
 }
 
 /// The run of each structure (or way of lines) with the largest share in it, ties by seed.
-fn one_of_each(group: &Group, by: By) -> Vec<(String, Structure, &Run)> {
-    let best = |structure: Structure, is: &dyn Fn(&&Run) -> bool| {
+fn one_of_each(group: &Group, by: By) -> Vec<(String, Structure, &GatheredRun)> {
+    let best = |structure: Structure, is: &dyn Fn(&&GatheredRun) -> bool| {
         group.runs.iter().filter(is).reduce(|best, next| {
             if next.share(structure) > best.share(structure) {
                 next
@@ -270,7 +273,7 @@ fn one_of_each(group: &Group, by: By) -> Vec<(String, Structure, &Run)> {
         By::Orientation => LineOrientation::ALL
             .into_iter()
             .filter_map(|o| {
-                let is = |run: &&Run| run.lines.orientation() == Some(o);
+                let is = |run: &&GatheredRun| run.lines.orientation() == Some(o);
                 Some((
                     o.name().to_owned(),
                     Structure::Line,
@@ -459,7 +462,7 @@ struct PredictionRow<'a> {
 fn predictions(name: Name, groups: &[&Group], gathered: &Gathered) -> Result<Figure, FigureError> {
     const SIDE: i32 = 40;
     const PANEL: i32 = 250;
-    let shown: Vec<(bool, String, &Group, &Run)> = groups
+    let shown: Vec<(bool, String, &Group, &GatheredRun)> = groups
         .iter()
         .flat_map(|group| {
             let grid = group.settings.scenario().grid();
@@ -534,7 +537,7 @@ struct Panel {
 
 fn temperature(name: Name, groups: &[&Group]) -> Result<Figure, FigureError> {
     let mut panels = Vec::new();
-    let panel = |title: String, group: &Group, is: &dyn Fn(&Run) -> bool| Panel {
+    let panel = |title: String, group: &Group, is: &dyn Fn(&GatheredRun) -> bool| Panel {
         title,
         runs: group
             .runs
@@ -544,7 +547,7 @@ fn temperature(name: Name, groups: &[&Group]) -> Result<Figure, FigureError> {
             .collect(),
         every: 2,
     };
-    let dispersed = |run: &Run| run.name() == Some(Structure::RandomDispersion);
+    let dispersed = |run: &GatheredRun| run.name() == Some(Structure::RandomDispersion);
     for group in groups {
         panels.push(panel(group.label.clone(), group, &|_| true));
     }
@@ -717,5 +720,5 @@ fn text(area: &Paper<'_>, words: &str, at: (i32, i32), size: i32) -> Result<(), 
 }
 
 fn csv_of(rows: &[impl Serialize]) -> String {
-    super::csv_text(rows)
+    csv_text(rows)
 }

@@ -1,8 +1,7 @@
 //! The paper's main findings, and whether they hold in our runs.
 
-use super::gather::{Gathered, Group, Resilient, Run, regained};
+use super::gather::{Gathered, GatheredRun, Group, Resilient, regained};
 use super::paper::{PaperValues, is_grouping};
-use super::plural;
 use super::statistics::{RUNS_MIN, Test, fisher, mann_whitney, median_interval, sign};
 use super::tables::MEDIAN_BEST_FITNESS;
 use minimal_surprise_evolution::reevaluation::{mean, median};
@@ -161,16 +160,16 @@ fn tendency(groups: &[&Group], is_true: bool, test: Test) -> Verdict {
     }
 }
 
-fn count(group: &Group, is: impl Fn(&Run) -> bool) -> u32 {
+fn count(group: &Group, is: impl Fn(&GatheredRun) -> bool) -> u32 {
     group.runs.iter().filter(|run| is(run)).count() as u32
 }
 
-fn is_named(run: &Run, structures: &[Structure]) -> bool {
+fn is_named(run: &GatheredRun, structures: &[Structure]) -> bool {
     run.name().is_some_and(|name| structures.contains(&name))
 }
 
 /// The runs of which something is not so.
-fn others(group: &Group, is: impl Fn(&Run) -> bool) -> Detail {
+fn others(group: &Group, is: impl Fn(&GatheredRun) -> bool) -> Detail {
     let others = group.runs.iter().filter(|run| !is(run)).map(|run| {
         let mut shares: Vec<_> = Structure::ALL.into_iter().zip(run.shares).collect();
         shares.retain(|(_, share)| *share > 0.0);
@@ -229,7 +228,7 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
 
 fn model_b(gathered: &Gathered) -> Option<Finding> {
     let [group] = groups(gathered, [("sensor-models", "B, 20x20")])?;
-    let is = |run: &Run| is_named(run, &[Structure::Line, Structure::Pair]);
+    let is = |run: &GatheredRun| is_named(run, &[Structure::Line, Structure::Pair]);
     let named = count(group, is);
     let number = group.runs.len() as u32 - named;
     let test = fisher(&[named, number], &[group.planned as u32, 0]);
@@ -277,7 +276,7 @@ fn many_structures(gathered: &Gathered) -> Vec<Finding> {
 }
 
 /// More than half of the runs are named so.
-fn most(group: &Group, claim: &str, what: &str, is: impl Fn(&Run) -> bool) -> Finding {
+fn most(group: &Group, claim: &str, what: &str, is: impl Fn(&GatheredRun) -> bool) -> Finding {
     let named = count(group, is);
     let others = group.runs.len() as u32 - named;
     let test = sign(named, others);
@@ -326,7 +325,7 @@ fn predefined(gathered: &Gathered) -> Vec<Finding> {
         return Vec::new();
     };
     let every = |group: &&Group| {
-        let is = |run: &Run| is_named(run, &[Structure::Line]);
+        let is = |run: &GatheredRun| is_named(run, &[Structure::Line]);
         let lines = count(group, is);
         let number = group.runs.len() as u32 - lines;
         let test = fisher(&[lines, number], &[group.planned as u32, 0]);
@@ -438,37 +437,6 @@ fn horizontal(gathered: &Gathered) -> Option<Finding> {
     )
 }
 
-/// The runs that were looked through, in words.
-pub(super) fn counted(resilient: &Resilient) -> String {
-    match resilient.further {
-        0 => plural(resilient.looked_through, "run"),
-        further => format!(
-            "{} and {further} beyond the plan",
-            plural(resilient.looked_through, "run")
-        ),
-    }
-}
-
-/// What became of all planned runs of a structure, in words; none if there are no areas to damage.
-pub(super) fn all_damaged(resilient: &Resilient) -> Option<String> {
-    let all = &resilient.overall;
-    let damaged = match resilient.named {
-        1 => "The one run damaged".to_owned(),
-        more => format!("All {more} runs damaged likewise"),
-    };
-    (all.areas > 0).then(|| {
-        format!(
-            "{damaged}, {}: the share at the end is at least that at the start after removal from \
-             {} (mean change {:+.1} points) and after repositioning from {} ({:+.1} points)",
-            plural(all.areas, "area"),
-            all.removal_holds,
-            100.0 * all.removal_gain,
-            all.repositioning_holds,
-            100.0 * all.repositioning_gain
-        )
-    })
-}
-
 fn resilience(resilient: &Resilient) -> Vec<Finding> {
     let of_kind = |kind: &str| {
         let claim = format!(
@@ -482,7 +450,7 @@ fn resilience(resilient: &Resilient) -> Vec<Finding> {
                 detail: Detail::None,
                 ours: format!(
                     "none of {} is named after the structure",
-                    counted(resilient)
+                    resilient.counted()
                 ),
                 test: "mean shares".into(),
                 p: None,
@@ -520,7 +488,9 @@ fn resilience(resilient: &Resilient) -> Vec<Finding> {
         });
         Finding {
             claim,
-            detail: all_damaged(resilient).map_or(Detail::None, Detail::Damaged),
+            detail: resilient
+                .all_damaged()
+                .map_or(Detail::None, Detail::Damaged),
             ours: words.collect::<Vec<_>>().join(", "),
             test: format!("mean shares of each area; {} of the runs", test.name),
             p: Some(test.p),
@@ -546,7 +516,7 @@ fn noise(gathered: &Gathered) -> Vec<Finding> {
     ) else {
         return Vec::new();
     };
-    let is = |run: &Run| is_named(run, &[Structure::RandomDispersion]);
+    let is = |run: &GatheredRun| is_named(run, &[Structure::RandomDispersion]);
     let dispersed = count(sparse, is);
     let number = sparse.runs.len() as u32 - dispersed;
     let test = fisher(&[dispersed, number], &[sparse.planned as u32, 0]);
@@ -573,7 +543,7 @@ fn noise(gathered: &Gathered) -> Vec<Finding> {
 fn fitness(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
     let of_group = |group: &Group| {
         let number = paper.number(&group.experiment, &group.label, MEDIAN_BEST_FITNESS)?;
-        let values = group.values(Run::fitness);
+        let values = group.values(GatheredRun::fitness);
         let ours = median(&values);
         let interval = median_interval(&values);
         let near = (ours - number.value).abs() <= FITNESS_TOLERANCE + PRINTED;

@@ -1,12 +1,13 @@
 //! What a report is about: the finished runs of a plan, and what is made of them afterwards.
 
 use super::damage_areas::{Rectangle, smallest_apart};
-use super::{ReportError, plural};
+use super::numbers::plural;
 use crate::suite::plan::{Plan, PlannedExperiment, PlannedRun, PlannedSettings, RUNS};
 use crate::suite::search::{Search, look};
 use crate::suite::{Reevaluation, Resilience, Suite};
 use minimal_surprise_controller::Controller;
 use minimal_surprise_evolution::damaged_runs::DamagedRuns;
+use minimal_surprise_evolution::files::FileError;
 use minimal_surprise_evolution::finished_run::FinishedRun;
 use minimal_surprise_evolution::reevaluation::{
     ResilienceRow, after_damage, mean, rerun, resilience,
@@ -15,13 +16,34 @@ use minimal_surprise_evolution::settings::Settings;
 use minimal_surprise_evolution::text::hex;
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::structures::{LineCounts, LineOrientation, Structure, classify};
-use minimal_surprise_sim::{Area, Damage, Pose, SeedTree};
+use minimal_surprise_sim::{Area, Damage, DamageError, Pose, SeedTree, WorldError};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
+/// Runs cannot be read or run again.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GatherError {
+    /// A file cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A final state is not one.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// A structure cannot be damaged.
+    #[error(transparent)]
+    Damage(#[from] DamageError),
+    /// A suite names an unknown structure.
+    #[error("structure = {name:?}: structures are {}", Structure::ALL.map(Structure::name).join(", "))]
+    UnknownStructure {
+        /// The name.
+        name: String,
+    },
+}
+
 /// A finished run and what is known of it.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub struct GatheredRun {
     /// Its name.
     pub id: String,
     /// Everything in its directory.
@@ -35,7 +57,7 @@ pub struct Run {
     pub lines: LineCounts,
 }
 
-impl Run {
+impl GatheredRun {
     /// Fitness of the last generation's best genome.
     #[must_use]
     pub fn fitness(&self) -> f64 {
@@ -76,7 +98,7 @@ pub struct Group {
     /// Runs that are planned.
     pub planned: usize,
     /// Those that are finished, by seed.
-    pub runs: Vec<Run>,
+    pub runs: Vec<GatheredRun>,
 }
 
 impl Group {
@@ -108,7 +130,7 @@ impl Group {
     }
 
     /// One number of every run.
-    pub fn values(&self, of: impl Fn(&Run) -> f64) -> Vec<f64> {
+    pub fn values(&self, of: impl Fn(&GatheredRun) -> f64) -> Vec<f64> {
         self.runs.iter().map(of).collect()
     }
 }
@@ -176,7 +198,7 @@ pub struct Damaged {
     /// The setting it evolved under.
     pub label: String,
     /// The run.
-    pub run: Run,
+    pub run: GatheredRun,
     /// As it evolved.
     pub initial: ResilienceRow,
     /// From new starts.
@@ -281,8 +303,8 @@ impl Gathered {
     /// Reads the finished runs of a plan and makes of them what the suite asks for.
     ///
     /// # Errors
-    /// [`ReportError`] if a finished run cannot be run again.
-    pub fn read(plan: &Plan, suite: &Suite, directory: &Path) -> Result<Self, ReportError> {
+    /// [`GatherError`] if a finished run cannot be run again.
+    pub fn read(plan: &Plan, suite: &Suite, directory: &Path) -> Result<Self, GatherError> {
         let (mut groups, mut damaged) = (Vec::new(), DamagedRuns::default());
         for experiment in &plan.experiments {
             for settings in experiment.settings() {
@@ -365,7 +387,7 @@ fn read_group(
     settings: PlannedSettings,
     directory: &Path,
     damaged: &mut DamagedRuns,
-) -> Result<Group, ReportError> {
+) -> Result<Group, GatherError> {
     let mut runs = Vec::new();
     for planned in settings.runs() {
         runs.extend(read_run(&planned, &planned.directory(directory), damaged)?);
@@ -386,7 +408,7 @@ fn read_further(
     number: usize,
     directory: &Path,
     damaged: &mut DamagedRuns,
-) -> Result<Vec<Group>, ReportError> {
+) -> Result<Vec<Group>, GatherError> {
     let mut groups: Vec<Group> = Vec::new();
     for planned in experiment.further().take(number) {
         let Some(run) = read_run(&planned, &planned.directory(directory), damaged)? else {
@@ -416,12 +438,12 @@ fn read_run(
     planned: &PlannedRun,
     directory: &Path,
     damaged: &mut DamagedRuns,
-) -> Result<Option<Run>, ReportError> {
+) -> Result<Option<GatheredRun>, GatherError> {
     let Some(finished) = damaged.read(directory) else {
         return Ok(None);
     };
     let found = classify(finished.settings.scenario().grid(), &finished.final_poses)?;
-    Ok(Some(Run {
+    Ok(Some(GatheredRun {
         id: planned.id.clone(),
         names: found.names(),
         shares: Structure::ALL.map(|structure| found.share(structure)),
@@ -430,7 +452,7 @@ fn read_run(
     }))
 }
 
-fn reevaluate(asked: &Reevaluation, group: &Group) -> Result<Reevaluated, ReportError> {
+fn reevaluate(asked: &Reevaluation, group: &Group) -> Result<Reevaluated, GatherError> {
     let mut genomes = Vec::new();
     let mut hash = Sha256::new();
     for run in &group.runs {
@@ -496,25 +518,25 @@ fn damage(
     plan: &Plan,
     directory: &Path,
     damaged_runs: &mut DamagedRuns,
-) -> Result<Resilient, ReportError> {
+) -> Result<Resilient, GatherError> {
     let structure = asked
         .structure()
-        .ok_or_else(|| ReportError::UnknownStructure {
+        .ok_or_else(|| GatherError::UnknownStructure {
             name: asked.structure.clone(),
         })?;
-    let all: Vec<(&Group, &Run)> = groups
+    let all: Vec<(&Group, &GatheredRun)> = groups
         .iter()
         .filter(|group| group.experiment == asked.of)
         .flat_map(|group| group.runs.iter().map(move |run| (group, run)))
         .collect();
-    let named: Vec<(&Group, &Run)> = all
+    let named: Vec<(&Group, &GatheredRun)> = all
         .iter()
         .copied()
         .filter(|(_, run)| run.names.contains(&structure))
         .collect();
     // The first of the best: by share, then by seed, then in the plan's order.
     let chosen = named.iter().copied().reduce(|best, next| {
-        let key = |run: &Run| (run.share(structure), run.finished.settings.seed());
+        let key = |run: &GatheredRun| (run.share(structure), run.finished.settings.seed());
         let ((best_share, best_seed), (share, seed)) = (key(best.1), key(next.1));
         if share > best_share || (share == best_share && seed < best_seed) {
             next
@@ -549,8 +571,8 @@ fn damage(
 fn overall<'a>(
     asked: &Resilience,
     structure: Structure,
-    runs: impl Iterator<Item = &'a Run>,
-) -> Result<Overall, ReportError> {
+    runs: impl Iterator<Item = &'a GatheredRun>,
+) -> Result<Overall, GatherError> {
     let mut all = Overall::default();
     let mut hash = Sha256::new();
     for run in runs {
@@ -563,7 +585,7 @@ fn overall<'a>(
                 let row = after_damage(finished, structure, damage, asked.repeat)?;
                 all.repetitions += row.fitness.len();
                 add_row(&mut hash, &row);
-                Ok::<_, ReportError>(regained(&row))
+                Ok::<_, GatherError>(regained(&row))
             };
             let removal = gain(Damage::Remove(area))?;
             let repositioning = gain(Damage::Reposition(area))?;
@@ -585,8 +607,8 @@ fn damage_run(
     asked: &Resilience,
     structure: Structure,
     label: &str,
-    of: &Run,
-) -> Result<Damaged, ReportError> {
+    of: &GatheredRun,
+) -> Result<Damaged, GatherError> {
     let finished = &of.finished;
     let conditions = finished.settings.scenario();
     let grid = conditions.grid();
@@ -646,4 +668,37 @@ fn three(rows: Vec<ResilienceRow>) -> [ResilienceRow; 3] {
 #[must_use]
 pub fn regained(row: &ResilienceRow) -> f64 {
     mean(&row.share_end) - mean(&row.share_start)
+}
+
+impl Resilient {
+    /// The runs that were looked through, in words.
+    pub(super) fn counted(&self) -> String {
+        match self.further {
+            0 => plural(self.looked_through, "run"),
+            further => format!(
+                "{} and {further} beyond the plan",
+                plural(self.looked_through, "run")
+            ),
+        }
+    }
+
+    /// What became of all planned runs of a structure, in words; none if there are no areas to damage.
+    pub(super) fn all_damaged(&self) -> Option<String> {
+        let all = &self.overall;
+        let damaged = match self.named {
+            1 => "The one run damaged".to_owned(),
+            more => format!("All {more} runs damaged likewise"),
+        };
+        (all.areas > 0).then(|| {
+            format!(
+                "{damaged}, {}: the share at the end is at least that at the start after removal from \
+                 {} (mean change {:+.1} points) and after repositioning from {} ({:+.1} points)",
+                plural(all.areas, "area"),
+                all.removal_holds,
+                100.0 * all.removal_gain,
+                all.repositioning_holds,
+                100.0 * all.repositioning_gain
+            )
+        })
+    }
 }

@@ -1,10 +1,11 @@
 //! The report as one page that needs nothing else: pictures inline, no script, light and dark.
 
+use super::contents::SuiteReport;
 use super::findings::Verdict;
-use super::markdown::{interval, ours, sentence, theirs, verdict};
+use super::numbers::p_value;
 use super::tables::{Table, Value};
-use super::{Report, p_value, plural};
-use minimal_surprise_evolution::text::{html as escape, markdown, markdown_code};
+use super::wording::{SHARED, VERDICTS, heading, opening, reading, sentence, to_look_at};
+use minimal_surprise_evolution::text::html as escape;
 use pulldown_cmark::{Event, Parser, html::push_html};
 use std::fmt::Write;
 
@@ -27,26 +28,9 @@ svg { max-width: 100%; height: auto; } code { font-size: .9em; overflow-wrap: an
 /// Says which program made the page.
 const MARK: &str = "<meta name=\"generator\" content=\"minimal-surprise-evolver\">";
 
-/// Said before the findings.
-pub(super) const VERDICTS: &str = "*Holds* and *differs* say whether the statement, as worded, is \
-                                   true of our runs. The p-value stands beside it and only tells \
-                                   whether a tendency may be chance: one that is seen with p ≥ 0.05 \
-                                   is called *not significant*, and one that is not seen differs \
-                                   only with p < 0.05.";
-
-/// How to read a table's numbers.
-pub(super) fn reading(report: &Report, ours: &str, paper: &str) -> String {
-    let paper = if report.has_paper { paper } else { "" };
-    format!("{ours}{paper}.")
-}
-
-/// Said where experiments share runs.
-pub(super) const SHARED: &str = "Experiments that ask for the same settings and seeds share their \
-                                 runs; what is said of them is not independent.";
-
 /// The whole page.
 #[must_use]
-pub fn page(report: &Report) -> String {
+pub fn page(report: &SuiteReport) -> String {
     let title = format!("Report of the suite {}", report.suite);
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{MARK}\n\
@@ -86,90 +70,6 @@ pub fn page(report: &Report) -> String {
     page
 }
 
-/// How every run can be looked at, where there is no gallery.
-pub(super) fn to_look_at(report: &Report) -> String {
-    format!(
-        "A gallery of every run, its final state and its replay, is made by {}.",
-        markdown_code(&format!("{} report --gallery", report.called))
-    )
-}
-
-/// What comes first: what is missing, and where we differ.
-pub(super) fn opening(report: &Report) -> Vec<(&'static str, Vec<String>)> {
-    let mut opening = Vec::new();
-    if !report.damaged.is_empty() {
-        let runs: Vec<String> = report.damaged.iter().map(|id| markdown_code(id)).collect();
-        let line = format!(
-            "Left out of everything below, because they are damaged or unreadable: {}, {}.",
-            plural(runs.len(), "run"),
-            runs.join(", ")
-        );
-        opening.push(("Damaged runs", vec![line]));
-    }
-    if !report.missing.is_empty() {
-        let mut lines = vec![
-            "Not all runs are finished; everything below is of those that are.".to_owned(),
-            String::new(),
-        ];
-        lines.extend(report.missing.iter().map(|line| format!("- {line}")));
-        opening.push(("Missing runs", lines));
-    }
-    if report.tests > 0 || !report.findings.is_empty() {
-        let mut lines = Vec::new();
-        for finding in report.different_findings() {
-            let mut line = format!(
-                "- {}: *differs*: {}",
-                markdown(&finding.claim),
-                markdown(&finding.ours)
-            );
-            let detail = finding.detail.in_words(markdown, markdown_code);
-            if !detail.is_empty() {
-                let _ = write!(line, ". {detail}.");
-            }
-            lines.push(line);
-        }
-        if lines.is_empty() {
-            lines.push(
-                "No main finding of the paper that these runs can tell about differs.".into(),
-            );
-        } else {
-            lines.insert(
-                0,
-                "Main findings of the paper that do not hold in our runs:\n".into(),
-            );
-        }
-        lines.push(String::new());
-        lines.push(format!(
-            "Of {} of our numbers against the paper's, {} p < {}; by chance alone at most about \
-             {:.0} would. Sign tests of fewer than {} runs, which cannot, are not counted, and what \
-             two tables have is counted once.\n",
-            plural(report.tests, "test"),
-            match report.differences.len() {
-                1 => "1 has".to_owned(),
-                more => format!("{more} have"),
-            },
-            super::statistics::SIGNIFICANT,
-            super::statistics::SIGNIFICANT * report.tests as f64,
-            super::statistics::RUNS_MIN
-        ));
-        lines.extend(report.differences.iter().map(|line| format!("- {line}")));
-        opening.push(("Where we differ", lines));
-    }
-    if !report.looked_into.is_empty() {
-        opening.push(("What was looked into", report.looked_into.clone()));
-    }
-    opening
-}
-
-/// Heading of a table.
-pub(super) fn heading(table: &Table) -> String {
-    if table.source.is_empty() {
-        table.title.clone()
-    } else {
-        format!("{} — {}", table.source, table.title)
-    }
-}
-
 /// Markdown as HTML; HTML in it is text.
 fn rendered(markdown: &str) -> String {
     let mut page = String::new();
@@ -181,7 +81,7 @@ fn rendered(markdown: &str) -> String {
     page
 }
 
-fn write_findings(page: &mut String, report: &Report) {
+fn write_findings(page: &mut String, report: &SuiteReport) {
     if report.findings.is_empty() {
         return;
     }
@@ -249,17 +149,19 @@ fn write_table(page: &mut String, table: &Table) {
 }
 
 fn cell(value: &Value) -> String {
-    let mut cell = ours(value).map_or("–".to_owned(), |ours| format!("<b>{}</b>", escape(&ours)));
+    let mut cell = value
+        .ours_in_words()
+        .map_or("–".to_owned(), |ours| format!("<b>{}</b>", escape(&ours)));
     if value.ours.is_none() && value.test.is_some() {
         cell.clear();
     }
-    if let Some(interval) = interval(value) {
+    if let Some(interval) = value.interval_in_words() {
         let _ = write!(cell, "<small>{}</small>", escape(&interval));
     }
-    if let Some(paper) = theirs(value) {
+    if let Some(paper) = value.theirs_in_words() {
         let _ = write!(cell, "<small>paper {}</small>", escape(&paper));
     }
-    if let Some(verdict) = verdict(value) {
+    if let Some(verdict) = value.verdict_in_words() {
         let class = if value.compatible == Some(true) {
             "good"
         } else {
@@ -274,7 +176,7 @@ fn cell(value: &Value) -> String {
     cell
 }
 
-fn write_making(page: &mut String, report: &Report) {
+fn write_making(page: &mut String, report: &SuiteReport) {
     page.push_str(
         "<h2>How it was made</h2>\n<div class=\"wide\"><table><thead><tr><th>runs</th><th>seeds</th>\
          <th>minutes, CPU / clock</th><th>command and program</th><th>SHA-256 of the outcomes</th></tr></thead><tbody>\n",
@@ -317,7 +219,7 @@ mod tests {
             run: "f24ee6c408f704a9".to_owned(),
             formed: "pair 2 %, fitness 0.670 *".to_owned(),
         };
-        let report = Report {
+        let report = SuiteReport {
             findings: vec![Finding {
                 claim: "All are lines".to_owned(),
                 ours: "lines in 19 of 20 runs".to_owned(),
@@ -326,7 +228,7 @@ mod tests {
                 p: None,
                 verdict: Verdict::Differs,
             }],
-            ..Report::default()
+            ..SuiteReport::default()
         };
         let said = |by: &str, text: &str| {
             let written = format!("lines in 19 of 20 runs. Contradicted by {by}.");

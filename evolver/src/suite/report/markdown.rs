@@ -1,22 +1,24 @@
 //! The report as Markdown.
 
+use super::contents::SuiteReport;
+use super::numbers::p_value;
 use super::tables::{Table, Value};
-use super::{Report, number, p_value};
+use super::wording::{SHARED, VERDICTS, heading, opening, reading, sentence, to_look_at};
 use minimal_surprise_evolution::text::{markdown, markdown_code_cell};
 use std::fmt::Write;
 
 /// The whole report.
 #[must_use]
-pub fn text(report: &Report) -> String {
+pub fn text(report: &SuiteReport) -> String {
     let mut text = format!("# Report of the suite {}\n", markdown(&report.suite));
-    for (heading, paragraphs) in super::html::opening(report) {
+    for (heading, paragraphs) in opening(report) {
         let _ = write!(text, "\n## {heading}\n\n");
         for paragraph in paragraphs {
             let _ = writeln!(text, "{paragraph}");
         }
     }
     if !report.findings.is_empty() {
-        let _ = writeln!(text, "\n## Main findings\n\n{}\n", super::html::VERDICTS);
+        let _ = writeln!(text, "\n## Main findings\n\n{}\n", VERDICTS);
         text += "| the paper's finding | ours | test | p | verdict |\n|---|---|---|---|---|\n";
         for finding in &report.findings {
             let _ = writeln!(
@@ -30,7 +32,7 @@ pub fn text(report: &Report) -> String {
             );
         }
     }
-    let reading = super::html::reading(report, "Ours [95 % interval]", " · paper's");
+    let reading = reading(report, "Ours [95 % interval]", " · paper's");
     let _ = writeln!(text, "\n## Tables\n\n{reading}");
     for table in &report.tables {
         write_table(&mut text, table);
@@ -67,28 +69,19 @@ pub fn text(report: &Report) -> String {
         let _ = writeln!(text, "\n{time}");
     }
     if report.shares_runs {
-        let _ = writeln!(text, "\n{}", super::html::SHARED);
+        let _ = writeln!(text, "\n{}", SHARED);
     }
     text += "\nEvery run with its seed and hash: [runs.csv](runs.csv).\n";
     if report.has_gallery {
         let _ = writeln!(text, "Every run to look at: [gallery](gallery/index.html).");
     } else {
-        let _ = writeln!(text, "\n{}", super::html::to_look_at(report));
+        let _ = writeln!(text, "\n{}", to_look_at(report));
     }
     text
 }
 
-/// With a full stop.
-pub(super) fn sentence(words: &str) -> String {
-    format!("{words}.")
-}
-
 fn write_table(text: &mut String, table: &Table) {
-    let _ = write!(
-        text,
-        "\n### {}\n\n| |",
-        markdown(&super::html::heading(table))
-    );
+    let _ = write!(text, "\n### {}\n\n| |", markdown(&heading(table)));
     for column in &table.columns {
         let _ = write!(text, " {} |", markdown(column));
     }
@@ -117,10 +110,14 @@ fn name(name: &str, counted: &str) -> String {
 
 fn cell(value: &Value) -> String {
     let parts = [
-        ours(value).or_else(|| value.paper.map(|_| "–".to_owned())),
-        interval(value).map(|interval| format!("[{interval}]")),
-        theirs(value).map(|paper| format!("· {paper}")),
-        verdict(value),
+        value
+            .ours_in_words()
+            .or_else(|| value.paper.map(|_| "–".to_owned())),
+        value
+            .interval_in_words()
+            .map(|interval| format!("[{interval}]")),
+        value.theirs_in_words().map(|paper| format!("· {paper}")),
+        value.verdict_in_words(),
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
     if parts.is_empty() {
@@ -128,46 +125,4 @@ fn cell(value: &Value) -> String {
     } else {
         parts.join(" ")
     }
-}
-
-/// Our number, with the median in brackets if it is a mean.
-pub(super) fn ours(value: &Value) -> Option<String> {
-    let mean = number(value.ours?, value.digits);
-    Some(match value.ours_median {
-        Some(median) => format!("{mean} ({})", number(median, value.digits)),
-        None => mean,
-    })
-}
-
-/// The paper's number, likewise, with the digits that it has there.
-pub(super) fn theirs(value: &Value) -> Option<String> {
-    let paper = value.paper?;
-    Some(match value.paper_median {
-        Some(median) => format!("{paper} ({median})"),
-        None => paper.to_string(),
-    })
-}
-
-/// The 95 % interval.
-pub(super) fn interval(value: &Value) -> Option<String> {
-    let (low, high) = (value.low?, value.high?);
-    Some(format!(
-        "{}–{}",
-        number(low, value.digits),
-        number(high, value.digits)
-    ))
-}
-
-/// What the test says.
-pub(super) fn verdict(value: &Value) -> Option<String> {
-    let compatible = if value.compatible? {
-        "compatible"
-    } else {
-        "differs"
-    };
-    Some(format!(
-        "{compatible}, {} ({})",
-        p_value(value.p?),
-        value.test?
-    ))
 }

@@ -1,12 +1,13 @@
 //! The paper's tables with our numbers, the paper's, intervals and tests.
 
-use super::findings::{all_damaged, counted};
-use super::gather::{Gathered, Group, NewStart, Reevaluated, Resilient, Run, structure_named};
+use super::gather::{
+    Gathered, GatheredRun, Group, NewStart, Reevaluated, Resilient, structure_named,
+};
+use super::numbers::{number, p_value, plural};
 use super::paper::{
     DAMAGED_GRID, Distribution, GROUPING, MeanMedian, NONE, Of, PaperValues, Source,
     StructureValues, is_grouping,
 };
-use super::plural;
 use super::statistics::{
     Interval, RUNS_MIN, SIGN_TEST, Test, fisher, median_interval, median_is, wilson,
 };
@@ -442,7 +443,7 @@ fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table> {
         .into_iter()
         .filter(|s| of_paper(*s).is_some() || group.runs.iter().any(|run| run.names.contains(s)))
         .collect();
-    type Ours = fn(&Run, Structure) -> f64;
+    type Ours = fn(&GatheredRun, Structure) -> f64;
     type Theirs = fn(&StructureValues) -> MeanMedian;
     let measures: [(&str, usize, f64, Ours, Theirs); 4] = [
         (
@@ -530,7 +531,7 @@ enum Among {
 }
 
 impl Among {
-    fn has(self, run: &Run) -> bool {
+    fn has(self, run: &GatheredRun) -> bool {
         match self {
             Self::LineRuns => run.names.contains(&Structure::Line),
             Self::AllRuns => true,
@@ -553,7 +554,7 @@ impl Among {
 fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<Table> {
     type Values = fn(&Group) -> Vec<f64>;
     let medians: [(&str, usize, Values); 3] = [
-        (MEDIAN_BEST_FITNESS, 3, |g| g.values(Run::fitness)),
+        (MEDIAN_BEST_FITNESS, 3, |g| g.values(GatheredRun::fitness)),
         ("median share in the structure, %", 1, |g| {
             g.values(|run| 100.0 * run.named_share())
         }),
@@ -599,7 +600,7 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
     for (measure, among) in shares.into_iter().filter(|(m, _)| wanted(m)) {
         columns.push(measure.to_owned());
         for (row, group) in rows.iter_mut().zip(groups) {
-            let runs: Vec<&Run> = group.runs.iter().filter(|run| among.has(run)).collect();
+            let runs: Vec<&GatheredRun> = group.runs.iter().filter(|run| among.has(run)).collect();
             let spanning = runs.iter().filter(|run| run.lines.spanning > 0).count();
             let of = runs.len();
             let mut value = Value {
@@ -634,7 +635,7 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
     for (measure, grouping) in counts.into_iter().filter(|(m, _)| wanted(m)) {
         columns.push(measure.to_owned());
         for (row, group) in rows.iter_mut().zip(groups) {
-            let wanted = |run: &&Run| {
+            let wanted = |run: &&GatheredRun| {
                 run.name().is_some_and(|name| {
                     if grouping {
                         is_grouping(name)
@@ -692,7 +693,7 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
 }
 
 /// Sensors that the prediction network of a run predicts, on average, more often occupied than not.
-fn sensors_predicted_often(run: &Run) -> usize {
+fn sensors_predicted_often(run: &GatheredRun) -> usize {
     let predicted = run.finished.settings.topology().predicted();
     let averages = run.finished.average_prediction.iter().enumerate();
     averages
@@ -708,7 +709,7 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
     let mut shared = Vec::new();
     for group in gathered.groups.iter().filter(is_line) {
         let key = (group.experiment.as_str(), group.label.as_str());
-        let of_run = |run: &Run| {
+        let of_run = |run: &GatheredRun| {
             let name = run.lines.orientation().map_or(NONE, LineOrientation::name);
             vec![name.to_owned()]
         };
@@ -885,7 +886,7 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
                  same and are not tested."
             ));
         }
-        notes.extend(all_damaged(resilient).map(|words| words + "."));
+        notes.extend(resilient.all_damaged().map(|words| words + "."));
         for area in &damaged.areas {
             let r = area.rectangle;
             notes.push(format!(
@@ -933,7 +934,7 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
     } else {
         notes.push(format!(
             "There is none to damage in {}; more runs are needed.",
-            counted(resilient)
+            resilient.counted()
         ));
     }
     Table {
@@ -944,6 +945,50 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
         notes,
         columns: columns.map(str::to_owned).to_vec(),
         rows,
+    }
+}
+
+impl Value {
+    /// Our number, with the median in brackets if it is a mean.
+    pub(super) fn ours_in_words(&self) -> Option<String> {
+        let mean = number(self.ours?, self.digits);
+        Some(match self.ours_median {
+            Some(median) => format!("{mean} ({})", number(median, self.digits)),
+            None => mean,
+        })
+    }
+
+    /// The paper's number, likewise, with the digits that it has there.
+    pub(super) fn theirs_in_words(&self) -> Option<String> {
+        let paper = self.paper?;
+        Some(match self.paper_median {
+            Some(median) => format!("{paper} ({median})"),
+            None => paper.to_string(),
+        })
+    }
+
+    /// The 95 % interval.
+    pub(super) fn interval_in_words(&self) -> Option<String> {
+        let (low, high) = (self.low?, self.high?);
+        Some(format!(
+            "{}–{}",
+            number(low, self.digits),
+            number(high, self.digits)
+        ))
+    }
+
+    /// What the test says.
+    pub(super) fn verdict_in_words(&self) -> Option<String> {
+        let compatible = if self.compatible? {
+            "compatible"
+        } else {
+            "differs"
+        };
+        Some(format!(
+            "{compatible}, {} ({})",
+            p_value(self.p?),
+            self.test?
+        ))
     }
 }
 

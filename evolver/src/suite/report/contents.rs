@@ -1,0 +1,411 @@
+//! The contents of a report, before it is written in any format.
+
+use super::figures::{self, Figure, FigureError};
+use super::findings::{self, Finding, Verdict};
+use super::gather::{Gathered, GatheredRun, Group};
+use super::numbers::{p_value, plural};
+use super::paper::PaperValues;
+use super::tables::{self, Table, Value};
+use crate::report::progress::seconds;
+use crate::suite::Suite;
+use minimal_surprise_evolution::text::{hex, markdown, new_file_name, shell_word};
+use minimal_surprise_evolution::time_spent::TimeSpent;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+/// Names of a report's other files, without their ends.
+const OTHER_FILES: [&str; 4] = ["report", "runs", "findings", "how-made"];
+
+/// How the runs of a setting were made, the evolved ones or those that were run again.
+#[derive(Clone, Debug, Serialize)]
+pub struct Provenance {
+    /// The experiment.
+    pub experiment: String,
+    /// The setting.
+    pub setting: String,
+    /// Runs that are finished.
+    pub finished: usize,
+    /// Runs that are planned.
+    pub planned: usize,
+    /// First and last seed of those finished.
+    pub seeds: String,
+    /// Programs that did them.
+    pub programs: String,
+    /// SHA-256 of the runs' hashes, in order of their seeds; of runs that have none, of their
+    /// outcomes.
+    pub hash: String,
+    /// The command that does them.
+    pub command: String,
+    /// Seconds of computing, all threads together; 0 if it was not measured.
+    pub cpu_s: f64,
+    /// Seconds on the clock.
+    pub wall_s: f64,
+}
+
+impl Provenance {
+    /// Minutes of computing and on the clock, in words.
+    pub(super) fn minutes(&self) -> String {
+        if self.cpu_s == 0.0 {
+            "–".to_owned()
+        } else {
+            format!("{:.1} / {:.1}", self.cpu_s / 60.0, self.wall_s / 60.0)
+        }
+    }
+}
+
+/// Everything that a report says.
+#[derive(Clone, Debug, Default)]
+pub struct SuiteReport {
+    /// Name of the suite.
+    pub suite: String,
+    /// Experiments that lack runs, in words.
+    pub missing: Vec<String>,
+    /// Names of damaged runs, which are left out.
+    pub damaged: Vec<String>,
+    /// The findings.
+    pub findings: Vec<Finding>,
+    /// Where tests speak against our numbers and the paper's being the same, in words.
+    pub differences: Vec<String>,
+    /// What was looked into where we differ: the lines of a text that lies in the report's folder.
+    pub looked_into: Vec<String>,
+    /// Whether a gallery of the runs lies in the report's folder.
+    pub has_gallery: bool,
+    /// Whether experiments share runs.
+    pub shares_runs: bool,
+    /// Tests made in the tables that could find a difference, each counted once.
+    pub tests: usize,
+    /// Whether there are numbers of the paper beside ours.
+    pub has_paper: bool,
+    /// How the program was called with this suite.
+    pub called: String,
+    /// The tables.
+    pub tables: Vec<Table>,
+    /// The figures.
+    pub figures: Vec<Figure>,
+    /// How long all runs took, each counted once.
+    pub time: TimeSpent,
+    /// How it was made.
+    pub making: Vec<Provenance>,
+}
+
+impl SuiteReport {
+    /// The report of gathered runs.
+    ///
+    /// # Errors
+    /// [`FigureError`] if a figure cannot be drawn.
+    pub fn new(gathered: &Gathered, suite: &Suite, called: &str) -> Result<Self, FigureError> {
+        let paper = PaperValues::for_suite(suite.compare_with);
+        let mut tables = tables::all(gathered, &paper);
+        let mut figures = figures::all(gathered, &paper)?;
+        let mut taken = OTHER_FILES.map(str::to_owned).into();
+        let table_ids = tables.iter_mut().map(|table| &mut table.id);
+        for id in table_ids.chain(figures.iter_mut().map(|figure| &mut figure.id)) {
+            *id = new_file_name(id, &mut taken);
+        }
+        let missing = gathered
+            .groups
+            .iter()
+            .filter(|group| !group.is_complete())
+            .map(|group| {
+                let place = format!("{}, {}", group.experiment, group.label);
+                format!("{}: {}", markdown(&place), group.counted())
+            });
+        let mut seen = BTreeSet::new();
+        let (mut shares_runs, mut time) = (false, TimeSpent::default());
+        let groups = gathered.groups.iter().chain(&gathered.further);
+        for run in groups.clone().flat_map(|group| &group.runs) {
+            if seen.insert(&run.id) {
+                time = time.and(run.finished.time);
+            } else {
+                shares_runs = true;
+            }
+        }
+        let tests = tests(&tables);
+        Ok(Self {
+            suite: suite.name.clone(),
+            looked_into: Vec::new(),
+            has_gallery: false,
+            shares_runs,
+            time,
+            missing: missing.collect(),
+            damaged: gathered
+                .damaged
+                .iter()
+                .filter_map(|(run, _)| Some(run.file_name()?.to_string_lossy().into_owned()))
+                .collect(),
+            findings: findings::all(gathered, &paper),
+            differences: differences(&tests),
+            tests: tests.len(),
+            has_paper: tables.iter().any(has_paper),
+            called: called.to_owned(),
+            figures,
+            making: groups
+                .map(|group| provenance(group, called))
+                .chain(made_again(gathered, called))
+                .collect(),
+            tables,
+        })
+    }
+
+    /// How long all runs took, in words; nothing if it was not measured.
+    pub(super) fn time_in_words(&self) -> Option<String> {
+        let in_words = |s: f64| seconds(Duration::from_secs_f64(s));
+        (self.time.sittings > 0).then(|| {
+            format!(
+                "All runs took {} of computing and {} on the clock, summed over {} sittings of one \
+                 run each.",
+                in_words(self.time.cpu_s),
+                in_words(self.time.wall_s),
+                self.time.sittings
+            )
+        })
+    }
+
+    /// Findings of the paper that do not hold here.
+    pub fn different_findings(&self) -> impl Iterator<Item = &Finding> {
+        self.findings
+            .iter()
+            .filter(|finding| finding.verdict == Verdict::Differs)
+    }
+}
+
+fn has_paper(table: &Table) -> bool {
+    table.values().any(|value| value.paper.is_some())
+}
+
+/// The tests that could find a difference, with their tables; what two tables have counts once.
+fn tests(tables: &[Table]) -> Vec<(&Table, &Value)> {
+    let mut tests: Vec<(&Table, &Value)> = Vec::new();
+    for table in tables {
+        for value in table.values().filter(|value| value.could_differ()) {
+            if !tests.iter().any(|(_, other)| other.repeats(value)) {
+                tests.push((table, value));
+            }
+        }
+    }
+    tests
+}
+
+fn differences(tests: &[(&Table, &Value)]) -> Vec<String> {
+    let different = tests.iter().filter(|(_, v)| v.compatible == Some(false));
+    let words = different.map(|(table, value)| {
+        let source = if table.source.is_empty() {
+            &table.id
+        } else {
+            &table.source
+        };
+        let numbers = match (value.ours_in_words(), value.theirs_in_words()) {
+            (Some(ours), Some(paper)) => format!(": {ours}, paper {paper}"),
+            _ => String::new(),
+        };
+        format!(
+            "{}, {}, {}{numbers} ({}, {})",
+            markdown(source),
+            markdown(&value.setting),
+            value.what,
+            value.test.unwrap_or_default(),
+            p_value(value.p.unwrap_or(1.0))
+        )
+    });
+    words.collect()
+}
+
+fn provenance(group: &Group, called: &str) -> Provenance {
+    let programs: BTreeSet<&str> = group
+        .runs
+        .iter()
+        .map(|run| run.finished.program.as_str())
+        .collect();
+    let mut hash = Sha256::new();
+    for run in &group.runs {
+        hash.update(run.finished.hash.as_bytes());
+        hash.update(b"\n");
+    }
+    let times = group.runs.iter().map(|run| run.finished.time);
+    let time = times.fold(TimeSpent::default(), TimeSpent::and);
+    Provenance {
+        experiment: group.experiment.clone(),
+        setting: group.setting(),
+        finished: group.runs.len(),
+        planned: group.planned,
+        seeds: seeds(&group.runs),
+        programs: programs.into_iter().collect::<Vec<_>>().join("; "),
+        hash: if group.runs.is_empty() {
+            String::new()
+        } else {
+            hex(&hash.finalize())
+        },
+        command: format!("{called} run --only {}", shell_word(&group.experiment)),
+        cpu_s: time.cpu_s,
+        wall_s: time.wall_s,
+    }
+}
+
+/// First and last seed, in words.
+fn seeds(runs: &[GatheredRun]) -> String {
+    let mut seeds = runs.iter().map(|run| run.finished.settings.seed());
+    match (seeds.next(), seeds.next_back()) {
+        (Some(first), Some(last)) => format!("{first} to {last}"),
+        (Some(only), None) => only.to_string(),
+        _ => String::new(),
+    }
+}
+
+/// How the runs were made that a report itself runs again: from new starts and after damage.
+fn made_again(gathered: &Gathered, called: &str) -> Vec<Provenance> {
+    let program = format!(
+        "{} {}, revision {}",
+        env!("CARGO_PKG_NAME"),
+        env!("CARGO_PKG_VERSION"),
+        env!("BUILD_REVISION")
+    );
+    let again = |experiment: &str, setting, seeds, (finished, planned), hash: &str| Provenance {
+        experiment: experiment.to_owned(),
+        setting,
+        finished,
+        planned,
+        seeds,
+        programs: program.clone(),
+        hash: hash.to_owned(),
+        command: format!("{called} report"),
+        cpu_s: 0.0,
+        wall_s: 0.0,
+    };
+    let mut makings = Vec::new();
+    for reevaluated in &gathered.reevaluations {
+        let Some(group) = gathered.group(&reevaluated.experiment, &reevaluated.label) else {
+            continue;
+        };
+        let starts = reevaluated.starts as usize;
+        makings.push(again(
+            &reevaluated.name,
+            format!(
+                "{}: {}, {} of each genome",
+                group.experiment,
+                group.label,
+                plural(starts, "new start")
+            ),
+            seeds(&group.runs),
+            (reevaluated.genomes.len() * starts, group.planned * starts),
+            &reevaluated.hash,
+        ));
+    }
+    for resilient in &gathered.resiliences {
+        let name = &resilient.asked.name;
+        if let Some(damaged) = &resilient.damaged {
+            let runs = damaged.repetitions();
+            makings.push(again(
+                name,
+                format!(
+                    "{}: {}, from new starts and after damage",
+                    resilient.asked.of, damaged.label
+                ),
+                damaged.run.finished.settings.seed().to_string(),
+                (runs, runs),
+                &damaged.hash(),
+            ));
+        }
+        let overall = &resilient.overall;
+        if overall.repetitions > 0 {
+            makings.push(again(
+                name,
+                format!(
+                    "{}: all runs named after the structure ({}), after damage",
+                    resilient.asked.of, resilient.structure
+                ),
+                plural(resilient.named, "run"),
+                (overall.repetitions, overall.repetitions),
+                &overall.hash,
+            ));
+        }
+    }
+    makings
+}
+
+/// A row of `runs.csv`.
+#[derive(Serialize)]
+pub(super) struct RunRow<'a> {
+    experiment: &'a str,
+    setting: String,
+    id: &'a str,
+    seed: u64,
+    structures: String,
+    share: f64,
+    fitness: f64,
+    movement: f64,
+    intended_movement: f64,
+    horizontal_lines: u32,
+    vertical_lines: u32,
+    spanning_lines: u32,
+    hash: &'a str,
+    program: &'a str,
+}
+
+pub(super) fn run_rows(gathered: &Gathered) -> Vec<RunRow<'_>> {
+    let mut rows = Vec::new();
+    for group in gathered.groups.iter().chain(&gathered.further) {
+        for run in &group.runs {
+            let names: Vec<&str> = run.names.iter().map(|name| name.name()).collect();
+            rows.push(RunRow {
+                experiment: &group.experiment,
+                setting: group.setting(),
+                id: &run.id,
+                seed: run.finished.settings.seed(),
+                structures: names.join(";"),
+                share: run.named_share(),
+                fitness: run.fitness(),
+                movement: run.finished.movement,
+                intended_movement: run.finished.intended_movement,
+                horizontal_lines: run.lines.horizontal,
+                vertical_lines: run.lines.vertical,
+                spanning_lines: run.lines.spanning,
+                hash: &run.finished.hash,
+                program: &run.finished.program,
+            });
+        }
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::statistics::SIGN_TEST;
+    use super::*;
+
+    #[test]
+    fn tests_that_cannot_find_a_difference_or_are_repeated_do_not_count() {
+        let value = |of, p| Value {
+            setting: "a setting".to_owned(),
+            what: "a median".to_owned(),
+            of,
+            test: Some(SIGN_TEST),
+            p: Some(p),
+            compatible: Some(p >= 0.05),
+            ..Value::default()
+        };
+        let table = |values: Vec<Value>| Table {
+            id: "table".to_owned(),
+            source: String::new(),
+            title: String::new(),
+            notes: Vec::new(),
+            columns: Vec::new(),
+            rows: vec![tables::Row {
+                name: String::new(),
+                counted: String::new(),
+                values: values.into_iter().map(Some).collect(),
+            }],
+        };
+        let both = [
+            table(vec![value(5, 0.0625), value(6, 0.03125)]),
+            table(vec![value(6, 0.03125), value(7, 1.0)]),
+        ];
+        let counted: Vec<usize> = super::tests(&both)
+            .iter()
+            .map(|(_, value)| value.of)
+            .collect();
+        assert_eq!(counted, [6, 7]);
+        assert_eq!(differences(&super::tests(&both)).len(), 1);
+    }
+}

@@ -1,0 +1,39 @@
+//! Numbers in words, and rows as CSV.
+
+use serde::Serialize;
+
+/// So many of something.
+pub(super) fn plural(number: usize, what: &str) -> String {
+    let s = if number == 1 { "" } else { "s" };
+    format!("{number} {what}{s}")
+}
+
+/// A number with so many digits after the point, without a sign if it is zero.
+pub(super) fn number(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        _ => text,
+    }
+}
+
+/// A p-value in words.
+pub(super) fn p_value(p: f64) -> String {
+    if p < 0.001 {
+        "p < 0.001".to_owned()
+    } else {
+        format!("p = {p:.3}")
+    }
+}
+
+/// Rows as CSV.
+pub(super) fn csv_text(rows: &[impl Serialize]) -> String {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        table
+            .serialize(row)
+            .expect("plain rows are written to memory");
+    }
+    let bytes = table.into_inner().expect("memory needs no flushing");
+    String::from_utf8(bytes).expect("text stays text")
+}

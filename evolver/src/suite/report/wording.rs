@@ -1,0 +1,114 @@
+//! What a report says around its tables, findings and figures, in Markdown; the same for every format.
+
+use super::contents::SuiteReport;
+use super::numbers::plural;
+use super::statistics::{RUNS_MIN, SIGNIFICANT};
+use super::tables::Table;
+use minimal_surprise_evolution::text::{markdown, markdown_code};
+use std::fmt::Write;
+
+/// Said before the findings.
+pub(super) const VERDICTS: &str = "*Holds* and *differs* say whether the statement, as worded, is \
+                                   true of our runs. The p-value stands beside it and only tells \
+                                   whether a tendency may be chance: one that is seen with p ≥ 0.05 \
+                                   is called *not significant*, and one that is not seen differs \
+                                   only with p < 0.05.";
+
+/// How to read a table's numbers.
+pub(super) fn reading(report: &SuiteReport, ours: &str, paper: &str) -> String {
+    let paper = if report.has_paper { paper } else { "" };
+    format!("{ours}{paper}.")
+}
+
+/// Said where experiments share runs.
+pub(super) const SHARED: &str = "Experiments that ask for the same settings and seeds share their \
+                                 runs; what is said of them is not independent.";
+
+/// How every run can be looked at, where there is no gallery.
+pub(super) fn to_look_at(report: &SuiteReport) -> String {
+    format!(
+        "A gallery of every run, its final state and its replay, is made by {}.",
+        markdown_code(&format!("{} report --gallery", report.called))
+    )
+}
+
+/// What comes first: what is missing, and where we differ.
+pub(super) fn opening(report: &SuiteReport) -> Vec<(&'static str, Vec<String>)> {
+    let mut opening = Vec::new();
+    if !report.damaged.is_empty() {
+        let runs: Vec<String> = report.damaged.iter().map(|id| markdown_code(id)).collect();
+        let line = format!(
+            "Left out of everything below, because they are damaged or unreadable: {}, {}.",
+            plural(runs.len(), "run"),
+            runs.join(", ")
+        );
+        opening.push(("Damaged runs", vec![line]));
+    }
+    if !report.missing.is_empty() {
+        let mut lines = vec![
+            "Not all runs are finished; everything below is of those that are.".to_owned(),
+            String::new(),
+        ];
+        lines.extend(report.missing.iter().map(|line| format!("- {line}")));
+        opening.push(("Missing runs", lines));
+    }
+    if report.tests > 0 || !report.findings.is_empty() {
+        let mut lines = Vec::new();
+        for finding in report.different_findings() {
+            let mut line = format!(
+                "- {}: *differs*: {}",
+                markdown(&finding.claim),
+                markdown(&finding.ours)
+            );
+            let detail = finding.detail.in_words(markdown, markdown_code);
+            if !detail.is_empty() {
+                let _ = write!(line, ". {detail}.");
+            }
+            lines.push(line);
+        }
+        if lines.is_empty() {
+            lines.push(
+                "No main finding of the paper that these runs can tell about differs.".into(),
+            );
+        } else {
+            lines.insert(
+                0,
+                "Main findings of the paper that do not hold in our runs:\n".into(),
+            );
+        }
+        lines.push(String::new());
+        lines.push(format!(
+            "Of {} of our numbers against the paper's, {} p < {}; by chance alone at most about \
+             {:.0} would. Sign tests of fewer than {} runs, which cannot, are not counted, and what \
+             two tables have is counted once.\n",
+            plural(report.tests, "test"),
+            match report.differences.len() {
+                1 => "1 has".to_owned(),
+                more => format!("{more} have"),
+            },
+            SIGNIFICANT,
+            SIGNIFICANT * report.tests as f64,
+            RUNS_MIN
+        ));
+        lines.extend(report.differences.iter().map(|line| format!("- {line}")));
+        opening.push(("Where we differ", lines));
+    }
+    if !report.looked_into.is_empty() {
+        opening.push(("What was looked into", report.looked_into.clone()));
+    }
+    opening
+}
+
+/// Heading of a table.
+pub(super) fn heading(table: &Table) -> String {
+    if table.source.is_empty() {
+        table.title.clone()
+    } else {
+        format!("{} — {}", table.source, table.title)
+    }
+}
+
+/// With a full stop.
+pub(super) fn sentence(words: &str) -> String {
+    format!("{words}.")
+}
