@@ -554,7 +554,7 @@ fn work_whose_reader_goes_stops_unfinished_and_says_how_to_go_on() {
                  robots = [20]\npopulation = 4\ngenerations = 40\nrepetitions = 1\nsteps = 20\n";
     evolver.write("own.toml", suite.as_bytes());
     let run = "suite own.toml run --out suite --progress json";
-    unfinished(run, "head -1", "go on with: ");
+    unfinished(run, "head -1", "continue with: ");
     let finished = evolver.run(&["suite", "own.toml", "run", "--out", "suite"]);
     assert_eq!(finished.code, Some(0), "{finished:?}");
     assert!(finished.stdout.contains("6 of 6 runs done"), "{finished:?}");

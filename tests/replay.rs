@@ -616,9 +616,9 @@ fn numbers_that_cannot_be_are_refused_in_every_file_of_a_run() {
 fn what_cannot_be_read_is_not_said_to_be_missing() {
     let evolver = with_a_run();
     let run = evolver.folder().join("run");
-    let refused = |arguments: &str, problem: &str| {
+    let refused = |code: i32, arguments: &str, problem: &str| {
         let run = evolver.run(&words(arguments));
-        assert_ne!(run.code, Some(0), "{run:?}");
+        assert_eq!(run.code, Some(code), "{run:?}");
         assert!(run.stderr.contains(problem), "no {problem:?}: {run:?}");
         assert!(!run.stderr.contains("it has no"), "{run:?}");
     };
@@ -631,9 +631,9 @@ fn what_cannot_be_read_is_not_said_to_be_missing() {
         "gallery --out g",
         "evolve --resume",
     ] {
-        refused(&format!("{line} nowhere"), "nowhere: No such file");
-        refused(&format!("{line} run/DONE/x"), "Not a directory");
-        refused(&format!("{line} {long}"), "File name too long");
+        refused(2, &format!("{line} nowhere"), "nowhere: No such file");
+        refused(2, &format!("{line} run/DONE/x"), "Not a directory");
+        refused(2, &format!("{line} {long}"), "File name too long");
     }
     for file in [
         "DONE",
@@ -646,7 +646,11 @@ fn what_cannot_be_read_is_not_said_to_be_missing() {
         let path = run.join(file);
         fs::remove_file(&path).unwrap();
         fs::create_dir(&path).unwrap();
-        refused("replay run --svg a", &format!("run/{file}: Is a directory"));
+        refused(
+            1,
+            "replay run --svg a",
+            &format!("run/{file}: Is a directory"),
+        );
         fs::remove_dir(&path).unwrap();
         for wait_or_endless in ["pipe", "/dev/zero"] {
             if wait_or_endless == "pipe" {
@@ -656,12 +660,13 @@ fn what_cannot_be_read_is_not_said_to_be_missing() {
                 std::os::unix::fs::symlink(wait_or_endless, &path).unwrap();
             }
             for line in ["replay run --svg a", "classify run", "gallery run --out g"] {
-                refused(line, &format!("run/{file}: not a plain file"));
+                refused(1, line, &format!("run/{file}: not a plain file"));
             }
             fs::remove_file(&path).unwrap();
         }
         std::os::unix::fs::symlink(file, &path).unwrap();
         refused(
+            1,
             "replay run --svg a",
             &format!("run/{file}: Too many levels"),
         );

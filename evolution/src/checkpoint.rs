@@ -16,6 +16,7 @@ const SCHEMA: u32 = 1;
 
 /// The bytes are not a checkpoint that can be continued from.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CheckpointError {
     /// The file was cut or changed.
     #[error("the checkpoint is damaged: {0}")]

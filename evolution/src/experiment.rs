@@ -14,7 +14,7 @@ use minimal_surprise_sim::{Engine, Evaluator, Path, Pose, SeedTree, Trial, World
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
 
-/// What a generation came to.
+/// The result of a generation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GenerationRecord {
     /// Number of the generation, from 0.
@@ -61,11 +61,11 @@ pub struct EvolutionResult {
     pub genome: Genome,
     /// Where it comes from.
     pub provenance: Provenance,
-    /// The repetition that it was run from.
+    /// The repetition whose start was used.
     pub repetition: u32,
     /// Starting poses.
     pub starts: Vec<Pose>,
-    /// What the run came to.
+    /// The outcome of the run.
     pub outcome: Outcome,
     /// How it went.
     pub measures: Measures,

@@ -56,6 +56,7 @@ pub struct FinishedRun {
 
 /// A run directory cannot be read back.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReadRunError {
     /// The run has not ended, or there is none.
     #[error("{} holds no complete run: it has no {missing}", path.display())]
@@ -77,6 +78,9 @@ pub enum ReadRunError {
         /// What is wrong.
         error: Box<ReadRunError>,
     },
+    /// There is no such directory, or it cannot be entered.
+    #[error(transparent)]
+    NotThere(FileError),
     /// A file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
@@ -130,6 +134,7 @@ pub enum ReadRunError {
 
 /// A file holds no final state.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StateError {
     /// It is not the JSON that it should be.
     #[error("{}: {error}", path.display())]
@@ -197,7 +202,7 @@ pub struct FinalState {
     pub starts: Vec<Pose>,
     /// Where it ended.
     pub final_poses: Vec<Pose>,
-    /// The repetition that it was run from.
+    /// The repetition whose start was used.
     pub repetition: u32,
     /// The run's hash.
     pub hash: String,
@@ -314,7 +319,7 @@ pub fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
         return Err(FileError::at(&path)(error).into());
     }
     // Of a directory that is not there, no file is missing.
-    std::fs::metadata(run).map_err(FileError::at(run))?;
+    std::fs::metadata(run).map_err(|error| ReadRunError::NotThere(FileError::at(run)(error)))?;
     Err(ReadRunError::NotComplete {
         path: run.to_owned(),
         missing: file,

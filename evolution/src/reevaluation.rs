@@ -10,7 +10,7 @@ use minimal_surprise_sim::structures::{LineOrientation, Pattern, Structure, clas
 use minimal_surprise_sim::{Pose, Scenario, SeedTree, Trial, WorldError};
 use rayon::prelude::*;
 
-/// What one run from a new start came to.
+/// The result of one run from a new start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rerun {
     /// Fitness, 0 to 1.
@@ -25,7 +25,7 @@ pub struct Rerun {
     pub final_poses: Vec<Pose>,
 }
 
-/// Runs a genome from so many new starts, in parallel.
+/// Runs a genome from this many new starts, in parallel.
 ///
 /// # Errors
 /// [`WorldError`] does not come up: starts are drawn on the scenario's own grid.

@@ -43,6 +43,7 @@ pub struct Checkpoint {
 
 /// A run directory cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RunDirError {
     /// There is something already; nothing is ever overwritten.
     #[error("{} exists; name a directory that does not, or continue with --resume", .0.display())]
@@ -72,7 +73,7 @@ pub enum RunDirError {
     /// A file cannot be used.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The environment asks for a path of the engine that there is not.
+    /// The environment asks for an unknown path of the engine.
     #[error(transparent)]
     EnginePath(#[from] PathError),
     /// It takes more than this machine has.
@@ -116,7 +117,7 @@ impl RunDirError {
 /// What `--resume` finds.
 #[derive(Debug)]
 pub enum Opened {
-    /// A run to go on with.
+    /// A run that can be resumed.
     Unfinished(Box<Experiment>, RunDir),
     /// A run that is complete, with its hash.
     Finished(String),
@@ -176,7 +177,7 @@ impl RunDir {
         Err(RunDirError::Exists(parent.join(name)))
     }
 
-    /// Opens a run to go on with it on so many threads.
+    /// Opens a run to resume it with this many threads.
     ///
     /// # Errors
     /// [`RunDirError`] if there is no run, it is in use, it was changed or damaged, or it takes more
@@ -196,7 +197,7 @@ impl RunDir {
             return Err(missing(CONFIG));
         }
         let lock = lock(path)?;
-        // Once more: who had the lock until now may have completed it.
+        // Check again: the previous holder of the lock may have completed it.
         if let Some(hash) = finished(path)? {
             return Ok(Opened::Finished(hash));
         }
@@ -213,7 +214,7 @@ impl RunDir {
         Ok(Opened::Unfinished(Box::new(experiment), run))
     }
 
-    /// Whether a run that is not complete can be gone on with, where there is the memory for it.
+    /// Checks whether an incomplete run can be resumed, if there is enough memory to read it.
     ///
     /// # Errors
     /// [`RunDirError`] if it cannot.

@@ -1,6 +1,6 @@
 //! The hash of the steps of one run of a swarm: who sensed, did and expected what, and where.
 //!
-//! A chain of SHA-256, so that whoever decodes the steps can check them one at a time: it starts
+//! A chain of SHA-256, so that a decoder can check the steps one at a time: it starts
 //! with the SHA-256 of a fixed text, the number of robots in 64 bits and their starting poses. Each
 //! step is `h ← SHA-256(h ‖ step)`: for every robot its reading in 16 bits, action and turn in 8
 //! bits each, its new prediction in 16 bits, and its pose afterwards. A pose is x and y in 16 bits

@@ -108,6 +108,7 @@ pub const DATA_BYTES_MAX: u64 = 256 << 20;
 
 /// A file is larger than what it should hold can be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TooLarge {
     /// The file says so.
     #[error("it has {found} bytes; at most {most} are read")]

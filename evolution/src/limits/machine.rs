@@ -39,7 +39,7 @@ fn address_space_max() -> Option<u64> {
 pub(super) fn disk_available(path: &Path) -> Option<u64> {
     let absolute = std::path::absolute(path).ok()?;
     let existing = absolute.ancestors().find(|path| path.exists())?;
-    // A file system that is no disk, as /proc, says nothing of what it could hold.
+    // A file system without a disk, such as /proc, reports no space.
     let disk = fs4::statvfs(existing).ok()?;
     (disk.total_space() > 0).then(|| disk.available_space())
 }

@@ -62,7 +62,7 @@ impl Place {
         }
     }
 
-    /// What is said of the bytes that there are.
+    /// How the available bytes are described.
     fn rest(&self) -> String {
         match self {
             Self::Memory => "available".to_owned(),
@@ -94,7 +94,7 @@ pub struct Needs {
     disk: Vec<Part>,
 }
 
-/// Threads if no number is given: one a core.
+/// Number of threads, by default one per core.
 #[must_use]
 pub fn threads(given: Option<u32>) -> f64 {
     let cores = || std::thread::available_parallelism().map_or(1, NonZero::get);
@@ -262,7 +262,7 @@ impl Needs {
         needs
     }
 
-    /// The same, so many times at once.
+    /// The same, this many times at once.
     #[must_use]
     pub fn times(mut self, number: f64) -> Self {
         for part in self.memory.iter_mut().chain(&mut self.disk) {
@@ -359,7 +359,7 @@ impl NeedsOfRuns {
         needs
     }
 
-    /// What they take of disk at least, if so many of them are done.
+    /// The least disk they need if this many of them are done.
     #[must_use]
     pub fn at_least_without(&self, done: u64) -> Needs {
         let left = (self.left - done as f64 * self.left_most).max(0.0);

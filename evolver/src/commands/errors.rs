@@ -51,18 +51,18 @@ pub fn exit_of(error: &anyhow::Error) -> Exit {
     }
 }
 
-/// Work has stopped before it was done. Says why and how to go on.
-pub(super) fn stopped(go_on: &str) -> anyhow::Result<Exit> {
+/// Work has stopped before it was done; reports why, and how to continue.
+pub(super) fn stopped(resume: &str) -> anyhow::Result<Exit> {
     match output::lost() {
         None => {
-            tell!("interrupted; go on with: {go_on}");
+            tell!("interrupted; continue with: {resume}");
             Ok(Exit::Interrupted)
         }
         Some(error) if output::is_gone(error) => Err(Unfinished(format!(
-            "nobody reads standard output any more, and not all is done; go on with: {go_on}"
+            "nobody reads standard output any more, and not all is done; continue with: {resume}"
         ))
         .into()),
-        Some(error) => anyhow::bail!("standard output: {error}; go on with: {go_on}"),
+        Some(error) => anyhow::bail!("standard output: {error}; continue with: {resume}"),
     }
 }
 
@@ -124,7 +124,13 @@ impl AboutInput for ReadRunError {
         match self {
             // Marked complete, it lacks something else.
             Self::NotComplete { missing, .. } => *missing == DONE,
-            Self::File(error) => error.path.ends_with(DONE) && error.is_bad_input(),
+            Self::NotThere(error) => error.is_bad_input(),
+            // The mark is looked for first; a directory or a pipe in its place is damage.
+            Self::File(error) => {
+                let damage = [ErrorKind::IsADirectory, ErrorKind::InvalidInput];
+                let is_damage = damage.contains(&error.error.kind());
+                error.path.ends_with(DONE) && error.is_bad_input() && !is_damage
+            }
             _ => false,
         }
     }
@@ -137,7 +143,7 @@ impl AboutInput for RunDirError {
             Self::EnginePath(_) | Self::TooMuch(_) => true,
             Self::NotThere(error) | Self::File(error) => error.is_bad_input(),
             Self::Damaged(error) => error.is_bad_input(),
-            Self::InUse { .. } | Self::Checkpoint { .. } => false,
+            _ => false,
         }
     }
 }

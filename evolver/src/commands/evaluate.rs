@@ -44,7 +44,7 @@ pub struct EvaluateArgs {
     /// Root of all random numbers [default: the seed that the genome evolved with, else 0].
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     seed: Option<String>,
-    /// Threads [default: one a core]; the result does not depend on them.
+    /// Threads; the result does not depend on them [default: one per core].
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     threads: Option<String>,
     /// Print JSON.

@@ -1,4 +1,4 @@
-//! `evolver evolve`: evolve a swarm, or go on with a run.
+//! `evolver evolve`: evolves a swarm, or resumes a run.
 
 use super::errors::{stopped, unusable};
 use super::replay::{check_terminal, in_terminal};

@@ -31,7 +31,7 @@ use minimal_surprise_evolution::run_files::{BEST, DONE};
 use minimal_surprise_evolution::settings::{THREADS_MAX, count};
 use std::path::{Path, PathBuf};
 
-/// The threads to work on; one a core if no number is given.
+/// The number of threads, by default one per core.
 ///
 /// # Errors
 /// If the operating system gives no threads.

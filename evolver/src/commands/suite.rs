@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 /// Name of the directory of the paper's suite.
 const BUILT_IN: &str = "paper";
 
-/// A suite of one's own.
+/// A suite in a file.
 #[derive(Debug, Args)]
 pub struct SuiteArgs {
     /// The suite's TOML file.
@@ -128,7 +128,7 @@ impl Choice {
 /// How to work.
 #[derive(Debug, Args)]
 pub struct RunOptions {
-    /// Threads [default: one a core]; no result depends on them.
+    /// Threads; no result depends on them [default: one per core].
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     threads: Option<String>,
     /// How progress is shown.
@@ -164,14 +164,14 @@ struct Read {
     /// Whether it is the built-in one.
     built_in: bool,
     text: String,
-    /// The command that it was read by.
+    /// The command that read it.
     called: String,
 }
 
 /// `evolver paper …`
 ///
 /// # Errors
-/// [`BadInput`] before anything is written; other errors leave runs that can be gone on with.
+/// [`BadInput`] before anything is written; other errors leave runs that can be resumed.
 pub fn paper(verb: &Verb) -> anyhow::Result<Exit> {
     let suite = Suite::paper().map_err(BadInput::new)?;
     let text = PAPER.to_owned();
@@ -534,12 +534,12 @@ fn print_searches(
         let said = match look(plan, asked, directory, 0, damaged) {
             Search::NotNeeded => continue,
             Search::Waits => format!(
-                "waits for the runs that it searches through; then, if none has a {}, on with: \
+                "waits for the runs that it searches through; then, if none has a {}, continue with: \
                  {command}",
                 asked.structure
             ),
             Search::Next(_, number) => format!(
-                "no {} yet; {} runs beyond the plan done; on with: {command}",
+                "no {} yet; {} runs beyond the plan done; continue with: {command}",
                 asked.structure,
                 number - 1
             ),
@@ -547,7 +547,7 @@ fn print_searches(
                 "{} in run {number} beyond the plan, seed {}",
                 asked.structure, run.seed
             ),
-            Search::InVain(number) => {
+            Search::NotFound(number) => {
                 format!("no {} in {number} runs beyond the plan", asked.structure)
             }
         };
@@ -666,7 +666,7 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     if !all_done && damaged.is_empty() {
         let gone = runs.number() - done;
         return Err(Unfinished(format!(
-            "{gone} runs were removed while others were done; go on with: the same command"
+            "{gone} runs were removed while others were done; continue with: the same command"
         ))
         .into());
     }
@@ -685,7 +685,7 @@ fn search_by(work: &Work) -> Option<String> {
         directory,
         ..
     } = *work;
-    // What is damaged may be in another share, and is said by the command.
+    // Damaged runs may be in another share; the command reports them.
     let is_needed = |asked: &Resilience| {
         let looked = look(plan, asked, directory, 0, &mut DamagedRuns::default());
         matches!(looked, Search::Waits | Search::Next(..))

@@ -29,7 +29,7 @@ pub struct SuiteProgress<'a> {
 }
 
 impl<'a> SuiteProgress<'a> {
-    /// Starts the clock: of so many runs, some wait and need so many robot-steps.
+    /// Starts the clock: of `runs` runs, `waiting` are to be done and need `left` robot-steps.
     #[must_use]
     pub fn start(mode: ProgressMode, plan: &'a Plan, runs: u64, waiting: u64, left: u64) -> Self {
         let bar = || ProgressBar::new(runs).with_position(runs - waiting);
@@ -151,7 +151,7 @@ impl Watch for SuiteProgress<'_> {
     }
 }
 
-/// Shows runs beyond a plan, of which nobody knows how many there will be.
+/// Shows runs beyond a plan, whose number is not known in advance.
 #[derive(Debug)]
 pub struct SearchProgress {
     shown: Shown,

@@ -63,7 +63,7 @@ pub struct Resilience {
     pub robots_in_areas: Vec<u32>,
     /// Runs of what is drawn at random.
     pub repeat: u32,
-    /// If no run of the experiment has the structure: so many runs more at most, until one has.
+    /// If no run of the experiment has the structure: most further runs until one has it.
     #[serde(default)]
     pub further_runs: u32,
 }
@@ -167,6 +167,7 @@ impl Reevaluation {
 
 /// A suite cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SuiteError {
     /// The file cannot be read.
     #[error(transparent)]
@@ -206,7 +207,7 @@ pub enum SuiteError {
 }
 
 impl Resilience {
-    /// The structure; none if there is none of that name.
+    /// The structure; none if the name is unknown.
     #[must_use]
     pub fn structure(&self) -> Option<Structure> {
         let spaced = self.structure.replace('-', " ");

@@ -1,4 +1,4 @@
-//! Plans: the runs of a suite, each under a name that says what it computes.
+//! Plans: the runs of a suite, each named by what it computes.
 //!
 //! A run's name is a hash of everything that its result depends on: the kernel, the version of
 //! what is computed with it, and the resolved settings with the seed. So finished work is found
@@ -104,7 +104,7 @@ impl PlannedExperiment {
     }
 
     /// # Panics
-    /// If there are not so many. All settings were checked when the plan was made.
+    /// If the combination does not exist. All settings were checked when the plan was made.
     fn combination(&self, combination: u64) -> PlannedSettings {
         let settings = self
             .asked
@@ -214,6 +214,7 @@ pub const RUNS: &str = "runs";
 
 /// The plan cannot be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlanError {
     /// No experiment has this name.
     #[error("--only = {name}: experiments are {}", names.join(", "))]
@@ -223,7 +224,7 @@ pub enum PlanError {
         /// The names there are.
         names: Vec<String>,
     },
-    /// There are not so many seeds, or too many combinations.
+    /// There are too few seeds, or too many combinations.
     #[error("experiment {experiment:?}: {problem}")]
     Experiment {
         /// The experiment.
@@ -241,7 +242,7 @@ impl Plan {
     /// many if asked for. Optional experiments are in only if they are named or all are wanted.
     ///
     /// # Errors
-    /// [`PlanError`] if there is no such experiment, or not so many seeds.
+    /// [`PlanError`] if there is no such experiment, or there are too few seeds.
     pub fn new(
         suite: &Suite,
         only: Option<&str>,

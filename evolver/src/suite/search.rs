@@ -2,7 +2,7 @@
 //!
 //! The runs of the experiment come first. If none of them is named after the structure, the seeds
 //! that follow are run, of all settings in turn, until one is; its place in that order says how many
-//! it took, whoever has done them.
+//! it took, whichever process did them.
 
 use super::file::Resilience;
 use super::plan::{Plan, PlannedRun};
@@ -17,12 +17,12 @@ pub enum Search {
     NotNeeded,
     /// Planned runs are not done yet.
     Waits,
-    /// This run is to be done next, the so many-th beyond the plan, from 1.
+    /// This run is next: run *k* beyond the plan, from 1.
     Next(Box<PlannedRun>, u32),
-    /// This run has it, the so many-th beyond the plan, from 1.
+    /// This run has it: run *k* beyond the plan, from 1.
     Found(Box<PlannedRun>, u32),
-    /// So many runs beyond the plan were done, the most that were asked for, and none has it.
-    InVain(u32),
+    /// All further runs, this many, are done, and none has it.
+    NotFound(u32),
 }
 
 /// Looks through the files of a suite; of the runs beyond the plan, only those after so many, which
@@ -61,7 +61,7 @@ pub fn look(
             None => return Search::Next(Box::new(run), number),
         }
     }
-    Search::InVain(asked.further_runs)
+    Search::NotFound(asked.further_runs)
 }
 
 /// Whether a run is named after a structure; none if it is not done.
@@ -174,7 +174,7 @@ mod tests {
         if number > 1 {
             let (less, plan) = suite(wanted.name(), number - 1);
             let looked = looked(&plan, &less.resiliences[0], &directory, 0);
-            assert!(matches!(looked, Search::InVain(n) if n == number - 1));
+            assert!(matches!(looked, Search::NotFound(n) if n == number - 1));
         }
         let (_, plan) = suite(wanted.name(), 0);
         let none = Resilience {

@@ -42,6 +42,7 @@ pub struct Job<'a> {
 
 /// The job could not be submitted.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SubmitError {
     /// A file cannot be written.
     #[error(transparent)]
@@ -140,7 +141,7 @@ impl Job<'_> {
         };
         let submitted = self.submit_from(&folder);
         if submitted.is_err() {
-            // No task will ever look into it; that it cannot be removed changes nothing.
+            // No task reads it; failure to remove it is ignored.
             let _ = fs::remove_dir_all(&folder);
         }
         submitted

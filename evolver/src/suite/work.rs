@@ -99,7 +99,7 @@ impl Waiting {
     const PAUSE_MIN: Duration = Duration::from_millis(10);
     /// The longest pause.
     const PAUSE_MAX: Duration = Duration::from_secs(1);
-    /// From a pause of this length on, waiting is said.
+    /// Waiting is reported from a pause of this length.
     const PAUSE_SAID: Duration = Duration::from_millis(160);
 
     /// Has not waited yet.
@@ -111,7 +111,7 @@ impl Waiting {
         }
     }
 
-    /// Waits before this run is looked at again. It is said once a run that there is a wait for it.
+    /// Waits before this run is checked again. The wait is reported once per run.
     pub fn wait_for(&mut self, run: &PlannedRun, say: impl FnOnce()) {
         if self.pause >= Self::PAUSE_SAID && self.said_of != run.id {
             say();
@@ -121,7 +121,7 @@ impl Waiting {
         self.pause = (self.pause * 2).min(Self::PAUSE_MAX);
     }
 
-    /// A run has come to its end, so others may soon.
+    /// A run has ended, so others may end soon.
     pub fn one_ended(&mut self) {
         self.pause = Self::PAUSE_MIN;
     }
@@ -133,7 +133,7 @@ impl Default for Waiting {
     }
 }
 
-/// Does a run, from where it is. `each_generation` is told the number of generations done.
+/// Does a run, from its last checkpoint. `each_generation` receives the number of generations done.
 ///
 /// # Errors
 /// [`RunDirError`] if the directory cannot be used.
@@ -261,7 +261,7 @@ mod tests {
         let directory = run.directory(&suite);
 
         let (mut slower, held) = open(&run, &directory).unwrap().unwrap();
-        // Whoever comes now makes a lock of its own, as on two machines that know none.
+        // The next process makes its own lock, as on machines that do not see each other's locks.
         fs::remove_file(directory.join(".lock")).unwrap();
         assert_eq!(
             work_on(&run, &suite, &stop, |_| {}).unwrap(),

@@ -104,7 +104,7 @@ impl ToDo {
     }
 }
 
-/// Whether the work came to its end.
+/// How the work ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
     /// Everything is done that could be.

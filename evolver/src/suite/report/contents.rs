@@ -68,7 +68,7 @@ pub struct SuiteReport {
     pub findings: Vec<Finding>,
     /// Where tests speak against our numbers and the paper's being the same, in words.
     pub differences: Vec<String>,
-    /// What was looked into where we differ: the lines of a text that lies in the report's folder.
+    /// Notes on the differences: the lines of a text in the report's folder.
     pub looked_into: Vec<String>,
     /// Whether a gallery of the runs lies in the report's folder.
     pub has_gallery: bool,

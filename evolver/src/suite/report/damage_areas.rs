@@ -41,7 +41,7 @@ impl Sums {
     }
 }
 
-/// For every number, in order, the smallest rectangle that holds just so many robots and neither
+/// For every number, in order, the smallest rectangle that holds exactly this many robots and neither
 /// meets nor touches those before it; of equally small ones the one with the southernmost, then
 /// westernmost corner, then the flattest. None where there is no such rectangle.
 #[must_use]

@@ -186,7 +186,7 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
             }
         }
     }
-    // In the paper's order; those that it does not have stay in the suite's.
+    // In the paper's order; structures that it lacks stay in the suite's order.
     figures.sort_by_key(|figure| figure.number.unwrap_or(u32::MAX));
     let numbers = ["Fig. 13: ", "Fig. 14: "];
     for (index, resilient) in gathered.resiliences.iter().enumerate() {
@@ -531,7 +531,7 @@ struct Panel {
     title: String,
     /// Of each run, its values.
     runs: Vec<Vec<f64>>,
-    /// Every so manyth value is shown.
+    /// Every *k*-th value is shown.
     every: usize,
 }
 

@@ -51,7 +51,7 @@ pub enum Detail {
     None,
     /// The runs that contradict it.
     Contradicted(Vec<Contradiction>),
-    /// What became of all runs of a damaged structure, in words.
+    /// The result for all runs of a damaged structure, in words.
     Damaged(String),
 }
 
@@ -100,7 +100,7 @@ pub struct Finding {
     pub claim: String,
     /// What we found.
     pub ours: String,
-    /// What it rests on.
+    /// Its evidence.
     pub detail: Detail,
     /// The test, or how it was told.
     pub test: String,
@@ -111,7 +111,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// Says nothing of groups that have no runs yet.
+    /// Leaves out groups without runs.
     fn about(mut self, groups: &[&Group]) -> Self {
         if groups.iter().any(|group| group.runs.is_empty()) {
             self.ours = "no runs yet".to_owned();
@@ -191,7 +191,7 @@ fn others(group: &Group, is: impl Fn(&GatheredRun) -> bool) -> Detail {
     }
 }
 
-/// "12 of 20 runs"; what is missing is said too.
+/// "12 of 20 runs", with the number of missing runs.
 fn of_runs(number: u32, group: &Group) -> String {
     format!("{number} of {} runs{}", group.runs.len(), unfinished(group))
 }

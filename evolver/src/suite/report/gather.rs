@@ -135,7 +135,7 @@ impl Group {
     }
 }
 
-/// What a genome formed from a new start: which way its lines go and what it is named after.
+/// The structures that a genome formed from a new start, and the orientation of its lines.
 #[derive(Clone, Debug)]
 pub struct NewStart {
     /// Fitness, 0 to 1.
@@ -186,9 +186,9 @@ pub struct DamagedArea {
     pub before: Vec<Pose>,
     /// After it went on.
     pub after: Vec<Pose>,
-    /// What became of it when robots were removed.
+    /// The result of removing robots.
     pub removed: ResilienceRow,
-    /// What became of it when they were put elsewhere.
+    /// The result of repositioning robots.
     pub repositioned: ResilienceRow,
 }
 
@@ -246,7 +246,7 @@ impl Damaged {
     }
 }
 
-/// What became of all runs of a structure that were damaged as the chosen one was.
+/// The result of the same damage to all runs of the structure.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overall {
     /// Runs after damage.
@@ -402,7 +402,7 @@ fn read_group(
     })
 }
 
-/// The first so many runs beyond the plan of an experiment, by settings.
+/// The first `number` runs beyond the plan of an experiment, by settings.
 fn read_further(
     experiment: &PlannedExperiment,
     number: usize,
@@ -553,7 +553,7 @@ fn damage(
                 (damaged.transpose()?, further)
             }
             Search::Next(_, next) => (None, next - 1),
-            Search::InVain(further) => (None, further),
+            Search::NotFound(further) => (None, further),
             Search::NotNeeded | Search::Waits => (None, 0),
         },
     };
@@ -644,7 +644,7 @@ fn damage_run(
     let (initial, new_starts) = match initial {
         Some(rows) => rows,
         None => {
-            // No area has so many robots; what needs none is still shown.
+            // No area has that many robots; rows that need no area are still shown.
             let nowhere = Damage::Remove(Area::new(grid, 0, 0, 0, 0)?);
             let [first, starts, _] = three(rows(nowhere, asked.repeat)?);
             (first, starts)
@@ -671,7 +671,7 @@ pub fn regained(row: &ResilienceRow) -> f64 {
 }
 
 impl Resilient {
-    /// The runs that were looked through, in words.
+    /// The number of runs searched, in words.
     pub(super) fn counted(&self) -> String {
         match self.further {
             0 => plural(self.looked_through, "run"),
@@ -682,7 +682,7 @@ impl Resilient {
         }
     }
 
-    /// What became of all planned runs of a structure, in words; none if there are no areas to damage.
+    /// The result for all planned runs of the structure, in words; none without areas to damage.
     pub(super) fn all_damaged(&self) -> Option<String> {
         let all = &self.overall;
         let damaged = match self.named {

@@ -25,7 +25,7 @@ figure { margin: 2em 0; overflow-x: auto; } figcaption { color: var(--soft); fon
 svg { max-width: 100%; height: auto; } code { font-size: .9em; overflow-wrap: anywhere; }
 ";
 
-/// Says which program made the page.
+/// Marks the page with the program that made it.
 const MARK: &str = "<meta name=\"generator\" content=\"minimal-surprise-evolver\">";
 
 /// The whole page.

@@ -64,14 +64,14 @@ pub struct Written {
 /// Where a report links to, in its directory, if there is a gallery of its runs.
 pub const GALLERY: &str = "gallery";
 
-/// Says that a directory holds a report, which another may replace.
+/// Marks a directory as a report, which another report may replace.
 const MARKER: &str = ".evolver-report";
 
 /// Whether a report would replace nothing but a report: the directory is new, marked as that of a
 /// report, or empty but for what is to be said in the report. A gallery in it must be marked, too.
 ///
 /// # Errors
-/// [`FileError`] if it cannot be looked into.
+/// [`FileError`] if it cannot be read.
 pub fn may_be_written(out: &Path) -> Result<bool, FileError> {
     let entries = match std::fs::read_dir(out) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(true),

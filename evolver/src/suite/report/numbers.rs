@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
-/// So many of something.
+/// A number and its noun, plural where needed.
 pub(super) fn plural(number: usize, what: &str) -> String {
     let s = if number == 1 { "" } else { "s" };
     format!("{number} {what}{s}")
 }
 
-/// A number with so many digits after the point, without a sign if it is zero.
+/// A number with this many digits after the point, without a sign if it is zero.
 pub(super) fn number(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     match text.strip_prefix('-') {

@@ -19,7 +19,7 @@ pub struct PaperValues {
     /// What runs of a structure are like.
     #[serde(rename = "structure")]
     pub structures: Vec<StructureValues>,
-    /// What became of damaged structures.
+    /// Results of damage to structures.
     #[serde(rename = "damage")]
     pub damages: Vec<DamageValues>,
     /// By how much partly predefining a line raises the share of line runs.
@@ -83,7 +83,7 @@ pub enum Of {
     NewStarts,
 }
 
-/// How many percent of the runs came to what.
+/// Percentages of runs by category.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Distribution {
@@ -185,7 +185,7 @@ pub struct StructureValues {
     pub intended_movement: MeanMedian,
 }
 
-/// What became of a damaged structure.
+/// The result of damage to a structure.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DamageValues {

@@ -38,7 +38,7 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// A test's name and what it came to.
+/// A test's name and its result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Test {
     /// Its name.

@@ -97,7 +97,7 @@ pub struct Row {
     pub name: String,
     /// How many of its runs there are.
     pub counted: String,
-    /// Its numbers, one a column; none where there is nothing to say.
+    /// Its numbers, one per column; none where there is no number.
     pub values: Vec<Option<Value>>,
 }
 

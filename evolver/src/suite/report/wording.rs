@@ -7,32 +7,32 @@ use super::tables::Table;
 use minimal_surprise_evolution::text::{markdown, markdown_code};
 use std::fmt::Write;
 
-/// Said before the findings.
+/// Written before the findings.
 pub(super) const VERDICTS: &str = "*Holds* and *differs* say whether the statement, as worded, is \
                                    true of our runs. The p-value stands beside it and only tells \
                                    whether a tendency may be chance: one that is seen with p ≥ 0.05 \
                                    is called *not significant*, and one that is not seen differs \
                                    only with p < 0.05.";
 
-/// How to read a table's numbers.
+/// Explains a table's numbers.
 pub(super) fn reading(report: &SuiteReport, ours: &str, paper: &str) -> String {
     let paper = if report.has_paper { paper } else { "" };
     format!("{ours}{paper}.")
 }
 
-/// Said where experiments share runs.
+/// Written where experiments share runs.
 pub(super) const SHARED: &str = "Experiments that ask for the same settings and seeds share their \
-                                 runs; what is said of them is not independent.";
+                                 runs, so their results are not independent.";
 
-/// How every run can be looked at, where there is no gallery.
+/// How to make the gallery, where there is none.
 pub(super) fn to_look_at(report: &SuiteReport) -> String {
     format!(
-        "A gallery of every run, its final state and its replay, is made by {}.",
+        "{} makes a gallery of all runs: final states and replays.",
         markdown_code(&format!("{} report --gallery", report.called))
     )
 }
 
-/// What comes first: what is missing, and where we differ.
+/// The opening sections: damaged and missing runs, and differences.
 pub(super) fn opening(report: &SuiteReport) -> Vec<(&'static str, Vec<String>)> {
     let mut opening = Vec::new();
     if !report.damaged.is_empty() {
@@ -79,8 +79,8 @@ pub(super) fn opening(report: &SuiteReport) -> Vec<(&'static str, Vec<String>)> 
         lines.push(String::new());
         lines.push(format!(
             "Of {} of our numbers against the paper's, {} p < {}; by chance alone at most about \
-             {:.0} would. Sign tests of fewer than {} runs, which cannot, are not counted, and what \
-             two tables have is counted once.\n",
+             {:.0} would. Sign tests with fewer than {} runs cannot reach that and are left out; a \
+             value in two tables counts once.\n",
             plural(report.tests, "test"),
             match report.differences.len() {
                 1 => "1 has".to_owned(),
@@ -94,7 +94,7 @@ pub(super) fn opening(report: &SuiteReport) -> Vec<(&'static str, Vec<String>)> 
         opening.push(("Where we differ", lines));
     }
     if !report.looked_into.is_empty() {
-        opening.push(("What was looked into", report.looked_into.clone()));
+        opening.push(("Notes on the differences", report.looked_into.clone()));
     }
     opening
 }

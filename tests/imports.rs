@@ -1,0 +1,164 @@
+//! Imports point one way: no two files of a crate import each other, directly or through others.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const CRATES: [&str; 4] = ["robot-slots", "robot-link", "evolution", "evolver"];
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// The module that a file is.
+fn module(source: &Path, root: &Path) -> Vec<String> {
+    let relative = source.strip_prefix(root).unwrap().with_extension("");
+    let mut module: Vec<String> = relative
+        .iter()
+        .map(|part| part.to_string_lossy().into_owned())
+        .collect();
+    if ["mod", "lib"].contains(&module.last().unwrap().as_str()) {
+        module.pop();
+    }
+    module
+}
+
+/// The text without comments and unit tests.
+fn code(source: &Path) -> String {
+    let text = fs::read_to_string(source).unwrap();
+    let text = text.split("#[cfg(test)]\nmod ").next().unwrap();
+    let lines = text.lines().map(|line| line.split("//").next().unwrap());
+    lines.collect::<Vec<_>>().join(" ")
+}
+
+/// The paths of a `use` tree, such as `crate::a::{b, c::d}`.
+fn paths(tree: &str, prefix: &str, found: &mut Vec<String>) {
+    let mut depth = 0;
+    let mut start = 0;
+    let ends = tree.char_indices().chain([(tree.len(), ',')]);
+    for (place, letter) in ends {
+        match letter {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            ',' if depth == 0 => {
+                let part = tree[start..place].trim();
+                start = place + 1;
+                match part.split_once('{') {
+                    Some((head, rest)) => {
+                        let rest = rest.trim_end().trim_end_matches('}');
+                        paths(rest, &format!("{prefix}{head}"), found);
+                    }
+                    None if part.is_empty() => {}
+                    None => found.push(format!("{prefix}{part}")),
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The modules that a module imports.
+fn imports(of: &[String], code: &str, modules: &BTreeSet<Vec<String>>) -> BTreeSet<Vec<String>> {
+    let mut found = Vec::new();
+    for part in code.split("use ").skip(1) {
+        if let Some((tree, _)) = part.split_once(';') {
+            paths(tree, "", &mut found);
+        }
+    }
+    for start in ["crate::", "super::"] {
+        let inline = code.match_indices(start).map(|(place, _)| {
+            let rest = &code[place..];
+            let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
+            rest[..end.unwrap_or(rest.len())].to_owned()
+        });
+        found.extend(inline);
+    }
+    let resolve = |path: &String| {
+        let mut base = of.to_vec();
+        let mut parts: Vec<&str> = path.split("::").map(str::trim).collect();
+        let is_local = matches!(parts.first(), Some(&"crate" | &"super"));
+        while matches!(parts.first(), Some(&"crate" | &"super")) {
+            if parts.remove(0) == "crate" {
+                base.clear();
+            } else {
+                base.pop();
+            }
+        }
+        // A path that names a child of this module needs no `self`.
+        let mut full = base;
+        full.extend(parts.iter().map(|&part| part.to_owned()));
+        if !is_local && !modules.contains(&full[..=of.len()]) {
+            return None;
+        }
+        while !full.is_empty() && !modules.contains(&full) {
+            full.pop();
+        }
+        (full != of && !full.is_empty()).then_some(full)
+    };
+    found.iter().filter_map(resolve).collect()
+}
+
+/// A cycle that begins at a module, if there is one.
+fn cycle<'a>(
+    from: &'a Vec<String>,
+    edges: &'a BTreeMap<Vec<String>, BTreeSet<Vec<String>>>,
+    done: &mut BTreeSet<&'a Vec<String>>,
+    way: &mut Vec<&'a Vec<String>>,
+) -> bool {
+    if way.contains(&from) {
+        way.push(from);
+        return true;
+    }
+    if !done.insert(from) {
+        return false;
+    }
+    way.push(from);
+    if edges[from].iter().any(|to| cycle(to, edges, done, way)) {
+        return true;
+    }
+    way.pop();
+    false
+}
+
+#[test]
+fn no_two_files_import_each_other() {
+    for name in CRATES {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("..")
+            .join(name)
+            .join("src");
+        let mut files = Vec::new();
+        sources(&root, &mut files);
+        files.retain(|file| !file.ends_with("tests.rs") && !file.ends_with("main.rs"));
+        let modules: BTreeSet<_> = files.iter().map(|file| module(file, &root)).collect();
+        let edges: BTreeMap<_, _> = files
+            .iter()
+            .map(|file| {
+                let module = module(file, &root);
+                // A module that only names its children does not use them.
+                let code = code(file).replace("pub use ", "pub ");
+                let imports = imports(&module, &code, &modules);
+                (module, imports)
+            })
+            .collect();
+        assert!(
+            edges.values().flatten().count() > 5,
+            "{name}: no imports were read"
+        );
+        let mut done = BTreeSet::new();
+        for module in edges.keys() {
+            let mut way = Vec::new();
+            assert!(
+                !cycle(module, &edges, &mut done, &mut way),
+                "{name}: {way:?}"
+            );
+        }
+    }
+}
