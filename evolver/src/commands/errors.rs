@@ -14,6 +14,7 @@ use minimal_surprise_evolution::run_files::DONE;
 use minimal_surprise_evolution::settings::SettingError;
 use minimal_surprise_evolution::text::shell_path;
 use minimal_surprise_replay::gallery::GalleryError;
+use std::io::ErrorKind;
 
 /// Input that cannot be used, in one message.
 #[derive(Debug, thiserror::Error)]
