@@ -1,27 +1,25 @@
-//! The parts of an evaluation, one by one, so that a loss shows where it happened.
-//!
-//! `cargo bench -p minimal-surprise-evolver`; the whole is measured by `evolver bench`.
+//! The parts of an evaluation, one by one, so that a loss shows where it happened:
+//! `cargo bench -p minimal-surprise-sim`. The whole is measured by `evolver bench`.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use minimal_surprise_controller::{
-    Controller, EncodedGenome, Genome, MutationRate, Provenance, SensorBits, SensorModel, State,
-    activate, codec,
-};
-use minimal_surprise_evolver::bench::populations;
+use minimal_surprise_controller::{Controller, EncodedGenome, Genome, SensorModel};
 use minimal_surprise_sim::structures::classify;
 use minimal_surprise_sim::{
-    Engine, Evaluator, Grid, NoiseRate, Path, Purpose, Scenario, SeedTree, TrialSet, World,
+    Engine, Evaluator, Grid, NoiseRate, Path, Scenario, SeedTree, TrialSet, World,
 };
 use std::hint::black_box;
 
-fn main() {
-    divan::main();
-}
-
 /// A genome from the middle of an evolution.
 fn genome() -> Genome {
-    populations::c_15x15().swap_remove(30)
+    let bytes = include_bytes!("evolved.genome");
+    EncodedGenome::decode(bytes)
+        .expect("a valid genome")
+        .to_genome()
+}
+
+fn main() {
+    divan::main();
 }
 
 fn trials(noise: f64, repetitions: u32) -> TrialSet {
@@ -32,50 +30,6 @@ fn trials(noise: f64, repetitions: u32) -> TrialSet {
         .map(|repetition| scenario.trial(SeedTree::new(1), 0, repetition))
         .collect();
     TrialSet::new(scenario, SensorModel::C, trials)
-}
-
-#[divan::bench]
-fn activation_of_all_inputs(bencher: Bencher) {
-    bencher.counter(ItemsCount::new(65_536_usize)).bench(|| {
-        (i16::MIN..=i16::MAX)
-            .map(|x| i32::from(activate(black_box(x))))
-            .sum::<i32>()
-    });
-}
-
-#[divan::bench]
-fn controller_from_a_genome(bencher: Bencher) {
-    let genome = genome();
-    bencher.bench(|| Controller::new(black_box(&genome)));
-}
-
-#[divan::bench]
-fn genome_decoded(bencher: Bencher) {
-    let mut buffer = [0; codec::CONTAINER_BYTES_MAX];
-    let bytes = codec::encode(&genome(), Provenance::default(), &mut buffer).expect("it fits");
-    bencher.bench(|| EncodedGenome::decode(black_box(bytes)).is_ok());
-}
-
-#[divan::bench]
-fn genome_mutated(bencher: Bencher) {
-    let rate = MutationRate::ratio(1, 10).expect("a valid rate");
-    let mut stream = SeedTree::new(1).stream(Purpose::Mutation, 0, 0);
-    let mut genome = genome();
-    bencher.bench_local(|| genome.mutate(rate, &mut stream));
-}
-
-#[divan::bench]
-fn one_robots_decision(bencher: Bencher) {
-    let controller = Controller::new(&genome());
-    let state = State::new(&controller);
-    bencher.bench(|| controller.decide(black_box(SensorBits::new(0x1234)), state.last_action()));
-}
-
-#[divan::bench]
-fn one_robots_step(bencher: Bencher) {
-    let controller = Controller::new(&genome());
-    let mut state = State::new(&controller);
-    bencher.bench_local(|| controller.step(&mut state, black_box(SensorBits::new(0x1234))));
 }
 
 #[divan::bench]
