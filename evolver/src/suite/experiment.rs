@@ -136,11 +136,12 @@ impl<'de> Deserialize<'de> for Key {
             setting.map(|setting| Self::Setting(setting.name))
         });
         found.ok_or_else(|| {
-            let keys: Vec<&str> = OWN
+            let keys = OWN
                 .into_iter()
-                .chain(lists.by_ref().map(|s| s.list))
-                .collect();
-            D::Error::custom(format!("unknown key `{key}`; keys are {}", keys.join(", ")))
+                .chain(lists.by_ref().map(|setting| setting.list));
+            let keys: Vec<String> = keys.map(|key| format!("`{key}`")).collect();
+            let keys = keys.join(", ");
+            D::Error::custom(format!("unknown field `{key}`, expected one of {keys}"))
         })
     }
 }
