@@ -149,10 +149,7 @@ fn no_two_files_import_each_other() {
                 (module, imports)
             })
             .collect();
-        assert!(
-            edges.values().flatten().count() > 5,
-            "{name}: no imports were read"
-        );
+        read += edges.values().flatten().count();
         let mut done = BTreeSet::new();
         for module in edges.keys() {
             let mut way = Vec::new();
