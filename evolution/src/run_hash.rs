@@ -46,9 +46,7 @@ impl RunHash {
             hash.update(weight.to_le_bytes());
         }
         for pose in final_poses {
-            hash.update(pose.x.to_le_bytes());
-            hash.update(pose.y.to_le_bytes());
-            hash.update([pose.heading as u8]);
+            hash.update(pose.bytes());
         }
         Self(hash.finalize().into())
     }

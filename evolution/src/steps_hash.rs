@@ -12,7 +12,7 @@
 use crate::text::hex;
 use minimal_surprise_controller::SensorModel;
 use minimal_surprise_sim::noise::NoiseStream;
-use minimal_surprise_sim::{Pose, Trial, World};
+use minimal_surprise_sim::{Trial, World};
 use sha2::{Digest, Sha256};
 use std::fmt;
 
@@ -54,7 +54,7 @@ impl StepsHash {
         let mut hash = Sha256::new_with_prefix(START);
         hash.update((starts.len() as u64).to_le_bytes());
         for &pose in starts {
-            add_pose(&mut hash, pose);
+            hash.update(pose.bytes());
         }
         let all_bits = version == Version::V1 && !trial.noise.rate().is_none();
         Self {
@@ -74,7 +74,7 @@ impl StepsHash {
             hash.update((reading.bits() | beyond).to_le_bytes());
             hash.update([decision.action as u8, decision.turn as u8]);
             hash.update(decision.prediction.bits().to_le_bytes());
-            add_pose(&mut hash, pose);
+            hash.update(pose.bytes());
         }
         self.chain = hash.finalize().into();
     }
@@ -84,10 +84,4 @@ impl fmt::Display for StepsHash {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&hex(&self.chain))
     }
-}
-
-fn add_pose(hash: &mut Sha256, pose: Pose) {
-    hash.update(pose.x.to_le_bytes());
-    hash.update(pose.y.to_le_bytes());
-    hash.update([pose.heading as u8]);
 }

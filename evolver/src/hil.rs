@@ -8,7 +8,7 @@
 use minimal_surprise_controller::{Controller, Decision, SensorBits, State, Surprise};
 use minimal_surprise_evolution::text::hex;
 use minimal_surprise_link::Stepped;
-use minimal_surprise_sim::{Pose, Scenario, Trial, World, WorldError};
+use minimal_surprise_sim::{Scenario, Trial, World, WorldError};
 use sha2::{Digest, Sha256};
 use std::fmt;
 
@@ -143,7 +143,7 @@ impl Record {
         let mut hash = Sha256::new_with_prefix(START);
         hash.update((world.poses().len() as u64).to_le_bytes());
         for &pose in world.poses() {
-            add_pose(&mut hash, pose);
+            hash.update(pose.bytes());
         }
         Self {
             hash,
@@ -158,7 +158,7 @@ impl Record {
             self.hash
                 .update([decision.action as u8, decision.turn as u8]);
             self.hash.update(decision.prediction.bits().to_le_bytes());
-            add_pose(&mut self.hash, pose);
+            self.hash.update(pose.bytes());
         }
         self.decisions.extend(world.decisions().first());
     }
@@ -172,10 +172,4 @@ impl Record {
             surprise,
         }
     }
-}
-
-fn add_pose(hash: &mut Sha256, pose: Pose) {
-    hash.update(pose.x.to_le_bytes());
-    hash.update(pose.y.to_le_bytes());
-    hash.update([pose.heading as u8]);
 }

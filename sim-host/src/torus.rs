@@ -176,6 +176,15 @@ pub struct Pose {
     pub heading: Heading,
 }
 
+impl Pose {
+    /// The bytes of a pose in every hash: x and y in 16 bits, little-endian, and the heading in 8.
+    #[must_use]
+    pub fn bytes(self) -> [u8; 5] {
+        let ([x0, x1], [y0, y1]) = (self.x.to_le_bytes(), self.y.to_le_bytes());
+        [x0, x1, y0, y1, self.heading as u8]
+    }
+}
+
 impl From<Pose> for (u16, u16, Heading) {
     fn from(pose: Pose) -> Self {
         (pose.x, pose.y, pose.heading)

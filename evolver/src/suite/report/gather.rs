@@ -487,9 +487,7 @@ fn reevaluate(asked: &Reevaluation, group: &Group) -> Result<Reevaluated, Gather
 
 fn add_poses(hash: &mut Sha256, poses: &[Pose]) {
     for pose in poses {
-        hash.update(pose.x.to_le_bytes());
-        hash.update(pose.y.to_le_bytes());
-        hash.update([u8::from(pose.heading)]);
+        hash.update(pose.bytes());
     }
 }
 
