@@ -13,7 +13,7 @@ use crate::suite::search::{Search, look};
 use crate::suite::status::{Counts, Hashes, Status};
 use crate::suite::work::Shard;
 use crate::suite::worker::{Ended, ToDo, Worker};
-use crate::suite::{PAPER, Resilience, Suite, slurm};
+use crate::suite::{PAPER, Resilience, Suite, cluster, slurm};
 use clap::{Args, Subcommand, ValueEnum};
 use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_evolution::files::{self, Existing, FileError, TEXT_BYTES_MAX};
@@ -301,7 +301,7 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
             dry_run,
             ..
         } => {
-            let job = slurm::Job {
+            let job = cluster::Job {
                 name: &read.suite.name,
                 directory: &std::path::absolute(&directory)?,
                 // A task without a run would only wait in the queue.
@@ -324,9 +324,9 @@ fn act(read: &Read, verb: &Verb) -> anyhow::Result<Exit> {
                 needs.check_disk(&directory).map_err(BadInput::new)?;
             }
             if *dry_run {
-                show!("{}", job.script().map_err(unusable)?);
+                show!("{}", slurm::script(&job).map_err(unusable)?);
             } else {
-                show_line!("{}", job.submit(&read.text).map_err(unusable)?);
+                show_line!("{}", slurm::submit(&job, &read.text).map_err(unusable)?);
             }
         }
     }

@@ -14,6 +14,7 @@
 //! robots = [50, 100]
 //! ```
 
+pub mod cluster;
 mod experiment;
 mod file;
 pub mod plan;
