@@ -1,0 +1,90 @@
+//! A job for a cluster: a submission has a folder of its own in the suite's directory, with copies of
+//! the program and the suite. A task that waits in the queue meets neither edited ones nor those of a
+//! later submission.
+
+use minimal_surprise_evolution::files::{self, FileError};
+use minimal_surprise_evolution::new_dir::{NewDir, remove_abandoned};
+use minimal_surprise_evolution::text::{shell_path, shell_word};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Folder of the submissions, in the suite's directory; each has a number.
+const JOBS: &str = "jobs";
+/// The suite's copy.
+const SUITE_FILE: &str = "suite.toml";
+/// The program's copy.
+const PROGRAM: &str = "evolver";
+/// The job script.
+pub(super) const SCRIPT: &str = "job.sh";
+
+/// Runs of a suite as tasks of a cluster.
+#[derive(Clone, Debug)]
+pub struct Job<'a> {
+    /// Name of the suite.
+    pub name: &'a str,
+    /// The suite's directory, absolute.
+    pub directory: &'a Path,
+    /// Tasks.
+    pub shards: u32,
+    /// Most tasks at once.
+    pub at_once: Option<u32>,
+    /// Flags that choose the runs.
+    pub flags: Vec<String>,
+}
+
+impl Job<'_> {
+    /// The folder of the next submission.
+    pub(super) fn next_folder(&self) -> PathBuf {
+        let jobs = self.directory.join(JOBS);
+        let mut next = (1_u32..).map(|number| jobs.join(number.to_string()));
+        let free = next.find(|folder| folder.symlink_metadata().is_err());
+        free.expect("there are more numbers than folders")
+    }
+
+    /// The command of one task; `shard` is its index, as the script knows it.
+    pub(super) fn command(&self, folder: &Path, shard: &str) -> String {
+        let flags = self
+            .flags
+            .iter()
+            .map(|flag| format!(" {}", shell_word(flag)));
+        format!(
+            "{program} run-task --shard \"{shard}/{shards}\" --suite {suite} --out {directory} \
+             --threads 1 --progress lines{flags}",
+            program = shell_path(&folder.join(PROGRAM)),
+            suite = shell_path(&folder.join(SUITE_FILE)),
+            directory = shell_path(self.directory),
+            shards = self.shards,
+            flags = flags.collect::<String>(),
+        )
+    }
+
+    /// Writes what the tasks need into the folder of a new submission.
+    pub(super) fn write(
+        &self,
+        suite_text: &str,
+        script: impl Fn(&Path) -> String,
+    ) -> Result<PathBuf, FileError> {
+        remove_abandoned(&self.directory.join(JOBS));
+        loop {
+            let folder = self.next_folder();
+            match write(&folder, suite_text, &script(&folder)) {
+                // Another submission has taken the number meanwhile.
+                Err(error) if error.is_exists() => {}
+                written => return written.map(|()| folder),
+            }
+        }
+    }
+}
+
+fn write(folder: &Path, suite_text: &str, script: &str) -> Result<(), FileError> {
+    let new = NewDir::beside(folder)?;
+    let program = new.path().join(PROGRAM);
+    files::replace(&new.path().join(SUITE_FILE), suite_text.as_bytes())
+        .and_then(|()| files::replace(&new.path().join(SCRIPT), script.as_bytes()))
+        .and_then(|()| {
+            let copied = std::env::current_exe().and_then(|this| fs::copy(this, &program));
+            copied.map(drop).map_err(FileError::at(&program))
+        })
+        .map_err(|error| new.in_place(error))?;
+    new.publish()
+}
