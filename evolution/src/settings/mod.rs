@@ -378,7 +378,7 @@ mod tests {
         );
         assert_eq!(
             error(&[("robots", "226")]),
-            "--robots = 226: 226 robots on a 15x15 grid; from 1 to 225 fit"
+            "--robots = 226: expected a whole number from 1 to 225"
         );
         assert_eq!(
             error(&[("noise", "NaN")]),

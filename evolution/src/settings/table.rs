@@ -164,7 +164,7 @@ macro_rules! settings {
                 list: $list,
                 meaning: concat!($($meaning),+),
                 set: |values, text| {
-                    values.$field = ($parse)(text)?;
+                    values.$field = ($parse)(text, values)?;
                     Ok(())
                 },
                 get: |values| ($write)(&values.$field),
@@ -178,84 +178,84 @@ settings! {
     grid(Grid): Grid = Grid::new(15, 15).expect("a valid grid"),
     "grid", "WxH", default "15x15",
     valid "width and height from 3 to 16384", list "grids",
-    parse grid,
+    parse |text, _: &Values| grid(text),
     write |grid: &Grid| Some(grid.to_string().into());
 
     /// Swarm size.
     robots(u32): u32 = 100,
     "robots", "N", default "100",
     valid "from 1 to the cells of the grid", list "robots",
-    parse |text| count(text, u32::MAX),
+    parse |text, values: &Values| count(text, values.grid.cells()),
     write |&robots: &u32| Some(robots.into());
 
     /// Sensor model: a, b or c.
     sensor_model(SensorModel): SensorModel = SensorModel::C,
     "sensor-model", "MODEL", default "c",
     valid "`a`, `b` or `c`", list "sensor-models",
-    parse model,
+    parse |text, _: &Values| model(text),
     write |&model: &SensorModel| Some(model_name(model).into());
 
     /// Probability that a sensor bit is flipped.
     noise(f64): f64 = 0.0,
     "noise", "P", default "0",
     valid "from 0 to 1", list "noise",
-    parse probability,
+    parse |text, _: &Values| probability(text),
     write |&noise: &f64| Some(noise.into());
 
     /// Fix all predictions to a template: line, pair, square or triangular-lattice.
     predefine(Template): Option<Template> = None,
     "predefine", "TEMPLATE", default "",
     valid "`line`, `pair`; with sensor model c also `square`, `triangular-lattice`", list "",
-    parse |text| template(text).map(Some),
+    parse |text, _: &Values| template(text).map(Some),
     write |template: &Option<Template>| template.map(|template| template.name().into());
 
     /// Fix only the predictions that the template sets: line (sensor model c).
     predefine_partly(Template): Option<Template> = None,
     "predefine-partly", "TEMPLATE", default "",
     valid "`line`, with sensor model c", list "",
-    parse |text| template(text).map(Some),
+    parse |text, _: &Values| template(text).map(Some),
     write |template: &Option<Template>| template.map(|template| template.name().into());
 
     /// Genomes per generation.
     population(u32): u32 = 50,
     "population", "N", default "50",
     valid "from 1 to 1000000", list "population",
-    parse |text| count(text, COUNT_MAX),
+    parse |text, _: &Values| count(text, COUNT_MAX),
     write |&population: &u32| Some(population.into());
 
     /// Generations.
     generations(u32): u32 = 100,
     "generations", "N", default "100",
     valid "from 1 to 1000000", list "generations",
-    parse |text| count(text, COUNT_MAX),
+    parse |text, _: &Values| count(text, COUNT_MAX),
     write |&generations: &u32| Some(generations.into());
 
     /// Repetitions per evaluation; the worst counts.
     repetitions(u32): u32 = 10,
     "repetitions", "N", default "10",
     valid "from 1 to 1000000", list "repetitions",
-    parse |text| count(text, COUNT_MAX),
+    parse |text, _: &Values| count(text, COUNT_MAX),
     write |&repetitions: &u32| Some(repetitions.into());
 
     /// Steps per repetition.
     steps(u32): u32 = 500,
     "steps", "N", default "500",
     valid "from 1 to 4294967295", list "steps",
-    parse |text| count(text, u32::MAX),
+    parse |text, _: &Values| count(text, u32::MAX),
     write |&steps: &u32| Some(steps.into());
 
     /// Probability that a weight mutates.
     mutation(f64): Option<f64> = None,
     "mutation", "P", default "0.1; 0.3 for the partly predefined line on 20x20",
     valid "from 0 to 1", list "mutation",
-    parse |text| probability(text).map(Some),
+    parse |text, _: &Values| probability(text).map(Some),
     write |mutation: &Option<f64>| mutation.map(Scalar::from);
 
     /// How parents are chosen: roulette, or tournament:K for the best of K genomes drawn.
     selection(Selection): Selection = Selection::Roulette,
     "selection", "METHOD", default "roulette",
     valid "`roulette`, or `tournament:K` with K from 1 to 1000000", list "selection",
-    parse Selection::parse,
+    parse |text, _: &Values| Selection::parse(text),
     write |&selection: &Selection| {
         // Added later: runs with the default are named as before.
         (selection != Selection::Roulette).then(|| selection.to_string().into())
@@ -265,34 +265,34 @@ settings! {
     crossover(f64): f64 = 0.0,
     "crossover", "P", default "0",
     valid "from 0 to 1", list "crossover",
-    parse probability,
+    parse |text, _: &Values| probability(text),
     write |&crossover: &f64| (crossover != 0.0).then(|| crossover.into());
 
     /// Start from a genome and its mutants.
     from(PathBuf): Option<PathBuf> = None,
     "from", "GENOME", default "",
     valid "a genome file of the same sensor model and predictions", list "",
-    parse |text| Ok::<_, String>(Some(path_of_text(text))),
+    parse |text, _: &Values| Ok::<_, String>(Some(path_of_text(text))),
     write |path: &Option<PathBuf>| path.as_deref().map(|path| text_of_path(path).into());
 
     /// Root of all random numbers; drawn and printed if not given.
     seed(u64): Option<u64> = None,
     "seed", "N", default "",
     valid "from 0 to 18446744073709551615", list "",
-    parse |text| seed(text).map(Some),
+    parse |text, _: &Values| seed(text).map(Some),
     write |seed: &Option<u64>| seed.map(Scalar::from);
 
     /// Threads; the result does not depend on them.
     threads(u32): Option<u32> = None,
     "threads", "N", default "one per core",
     valid "from 1 to 1024", list "",
-    parse |text| count(text, THREADS_MAX).map(Some),
+    parse |text, _: &Values| count(text, THREADS_MAX).map(Some),
     write |_: &Option<u32>| None;
 
     /// Directory of the run; must not exist.
     out(PathBuf): Option<PathBuf> = None,
     "out", "DIR", default "a new one in runs/",
     valid "a directory that does not exist", list "",
-    parse |text| Ok::<_, String>(Some(path_of_text(text))),
+    parse |text, _: &Values| Ok::<_, String>(Some(path_of_text(text))),
     write |_: &Option<PathBuf>| None;
 }
