@@ -1,6 +1,7 @@
 //! Reading a complete run directory back: the genome, where it started from, where it ended.
 
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
+use crate::genome_file::{GenomeFile, GenomeFileError};
 use crate::limits;
 use crate::ranges;
 use crate::run_files::{
@@ -10,8 +11,7 @@ use crate::run_files::{
 use crate::settings::{Overrides, SettingError, Settings};
 use crate::steps_hash::{RecordedHash, StepsHash, Version};
 use crate::time_spent::TimeSpent;
-use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
-use minimal_surprise_controller::{Controller, DecodeError, EncodedGenome, Genome, Provenance};
+use minimal_surprise_controller::{Controller, Genome, Provenance};
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::metrics::Measures;
 use minimal_surprise_sim::world::check_poses;
@@ -88,13 +88,8 @@ pub enum ReadRunError {
     #[error(transparent)]
     Settings(#[from] SettingError),
     /// The genome is not one this program runs.
-    #[error("{}: {error}", path.display())]
-    Genome {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        error: DecodeError,
-    },
+    #[error(transparent)]
+    Genome(#[from] GenomeFileError),
     /// A final state is not one.
     #[error(transparent)]
     State(#[from] StateError),
@@ -455,12 +450,7 @@ impl FinishedRun {
             .into_iter()
             .try_for_each(|file| require(path, file))?;
         let settings = settings_of_run(path)?;
-        let genome_path = path.join(BEST);
-        let bytes = files::read(&genome_path, CONTAINER_BYTES_MAX as u64)?;
-        let encoded = EncodedGenome::decode(&bytes).map_err(|error| ReadRunError::Genome {
-            path: genome_path,
-            error,
-        })?;
+        let genome = GenomeFile::read(&path.join(BEST))?;
         let state_path = path.join(FINAL);
         let state = parse_final_state(&state_path, &read_final_state(&state_path, &settings)?)?;
         let inconsistent = |problem| {
@@ -469,7 +459,7 @@ impl FinishedRun {
                 problem,
             })
         };
-        if encoded.topology() != settings.topology() {
+        if genome.topology() != settings.topology() {
             return inconsistent("best.genome has another topology than config.toml");
         }
         if state.grid != settings.scenario().grid()
@@ -498,7 +488,7 @@ impl FinishedRun {
                 "generations.csv has another number of lines than config.toml has generations",
             );
         }
-        let provenance = encoded.provenance();
+        let provenance = genome.provenance();
         if provenance.generation != settings.generations() - 1 {
             return inconsistent("best.genome is not of the last generation of config.toml");
         }
@@ -512,7 +502,7 @@ impl FinishedRun {
             error,
         })?;
         Ok(Self {
-            genome: encoded.to_genome(),
+            genome: genome.genome().clone(),
             provenance,
             repetition: state.repetition,
             starts: state.starts,

@@ -13,6 +13,7 @@ pub mod files;
 pub mod finished_run;
 pub mod fitness;
 pub mod generation_work;
+pub mod genome_file;
 pub mod limits;
 #[cfg(feature = "files")]
 pub mod lock;

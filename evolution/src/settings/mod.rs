@@ -12,12 +12,10 @@ pub use values::{
     probability, seed, seed_text,
 };
 
-use crate::files::{self, FileError};
+use crate::files::FileError;
+use crate::genome_file::GenomeFile;
 use crate::variation::Variation;
-use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
-use minimal_surprise_controller::{
-    DecodeError, EncodedGenome, Genome, MutationRate, Prediction, Topology,
-};
+use minimal_surprise_controller::{Genome, MutationRate, Prediction, Topology};
 use minimal_surprise_sim::{NoiseRate, Scenario};
 use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -319,14 +317,13 @@ fn topology(values: &Values) -> Result<Topology, Problem> {
 
 /// A genome file for a topology.
 fn read_genome_for(path: &Path, topology: Topology) -> Result<Genome, String> {
-    let bytes = files::read(path, CONTAINER_BYTES_MAX as u64).map_err(|e| e.error.to_string())?;
-    let encoded = EncodedGenome::decode(&bytes).map_err(|error: DecodeError| error.to_string())?;
-    if encoded.topology() == topology {
-        Ok(encoded.to_genome())
+    let file = GenomeFile::read(path).map_err(|error| error.problem())?;
+    if file.topology() == topology {
+        Ok(file.genome().clone())
     } else {
         Err(format!(
             "the genome is for {}, the run is for {}",
-            describe(encoded.topology()),
+            describe(file.topology()),
             describe(topology)
         ))
     }
