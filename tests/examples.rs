@@ -10,7 +10,6 @@ fn lines_of(example: &str) -> Vec<String> {
         .manifest_path(workspace)
         .package("minimal-surprise-evolution")
         .example(example)
-        .release()
         .run()
         .unwrap_or_else(|error| panic!("{example}: {error}"));
     let output = built.command().output().expect("the example starts");
