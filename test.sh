@@ -1,8 +1,8 @@
 #!/bin/sh
-# Passes every test: ./test.sh, or ./test.sh --all with those that take longer.
+# Runs all tests: ./test.sh, or ./test.sh --all to include the long ones.
 #
-# Provides what it needs (a C linker, the thumbv7em targets, QEMU, Chromium, GNU parallel, rustfmt
-# and clippy; for --all also Slurm), saying what it installs. Needs Rust and, where one of these is
+# Installs the tools it needs (a C linker, the thumbv7em targets, QEMU, Chromium, GNU parallel,
+# rustfmt and clippy; for --all also Slurm) and announces this. Needs Rust and, if a tool is
 # missing, Debian's apt-get as root or by sudo.
 set -eu
 cd "$(dirname "$0")"
@@ -13,7 +13,7 @@ case "$*" in
     *) echo 'usage: ./test.sh [--all]' >&2 && exit 2 ;;
 esac
 
-# Set by those who call this, not below: then nothing may be left out.
+# CI as set by the caller, before it is overwritten below: if true, no step may be skipped.
 strict=${CI:-}
 # A test that lacks a tool fails instead of being skipped.
 export CI=true
@@ -25,11 +25,11 @@ if ! command -v cargo >/dev/null; then
     PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
 fi
 if ! command -v cargo >/dev/null; then
-    echo 'test.sh: no cargo here; install Rust 1.95 or newer, e.g. by rustup' >&2
+    echo 'test.sh: cargo not found; install Rust 1.95 or newer, e.g. with rustup' >&2
     exit 69
 fi
 
-# Says which part of Rust is there, after adding it where it is not and can be added.
+# Prints the version of a Rust component; installs the component first if it is missing.
 component() {
     name=$1 command=$2 package=$3
     cargo "$command" --version 2>/dev/null && return
@@ -39,7 +39,7 @@ component() {
         scripts/apt-install.sh "$package" || true
     fi
     cargo "$command" --version 2>/dev/null && return
-    echo "test.sh: no $name, so nothing is checked with it" >&2
+    echo "test.sh: $name is missing; its checks are skipped" >&2
     [ "$strict" != true ] || exit 69
     return 1
 }
@@ -56,7 +56,7 @@ if [ -n "${TEST_ALL:-}" ]; then
         scripts/apt-install.sh slurmctld slurmd slurm-client munge; }; then
         slurmctld -V
     else
-        echo 'test.sh: no Slurm, which takes root and a host name in /etc/hosts, so no suite is run on one' >&2
+        echo 'test.sh: Slurm tests are skipped: they need root, Slurm and the host name in /etc/hosts' >&2
         [ "$strict" != true ] || exit 69
         without_slurm='--skip real_slurm'
     fi
@@ -70,7 +70,7 @@ for target in $targets; do
     if RUSTUP_TARGET_ADD=0 scripts/thumb-cargo.sh --compiler --target "$target" 2>&1 |
         grep -q 'from its source'; then
         core_from_source=1
-        # rustup was tried just now; where a network does not answer, each try takes its time.
+        # rustup has just failed; without a network, each further attempt would wait for a time-out.
         export RUSTUP_TARGET_ADD=0
     fi
 done
@@ -78,7 +78,7 @@ cargo --version
 promised=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 case $(rustc --version) in
     "rustc $promised".*) ;;
-    *) echo "test.sh: Rust $promised is promised, $(rustc --version) is what is tested" ;;
+    *) echo "test.sh: Rust $promised is promised, but $(rustc --version) is tested" ;;
 esac
 rustfmt=1 clippy=1
 component rustfmt fmt rustfmt-web || rustfmt=0
@@ -94,7 +94,7 @@ if [ $clippy = 1 ]; then
     say 'lints'
     cargo clippy --locked --workspace --all-targets --all-features -- -D warnings
     if [ $core_from_source = 1 ]; then
-        echo 'test.sh: clippy has no core library for the target: only the portable part of the firmware'
+        echo 'test.sh: clippy has no core library for the target; checking only the portable firmware'
         cargo clippy --locked --manifest-path firmware-example/Cargo.toml --lib -- -D warnings
     else
         (cd firmware-example &&
@@ -124,7 +124,7 @@ for features in '' minimal-surprise-slots/defmt,minimal-surprise-link/defmt; do
         --package minimal-surprise-link --features "$features" --target thumbv7em-none-eabihf
 done
 
-say "the robot's firmware for both of its boards"
+say "the robot's firmware for both boards"
 (cd firmware-example &&
     ../scripts/thumb-cargo.sh build --locked --release --bin robot &&
     ../scripts/thumb-cargo.sh build --locked --release --package robot-stm32f4)
@@ -146,23 +146,23 @@ cargo test --locked --workspace --all-features --no-fail-fast -- --show-output $
 if [ -n "${TEST_ALL:-}" ]; then
     say 'every power cut after every power cut'
     cargo test --locked --release --package minimal-surprise-slots --test power_cuts -- --show-output
-    say 'every reader of foreign bytes, guided by coverage' && scripts/fuzz.sh
+    say 'coverage-guided fuzzing of every reader of untrusted input' && scripts/fuzz.sh
 fi
 
 if [ -n "${TEST_ALL:-}" ]; then
-    say 'what the project depends on'
+    say 'dependencies'
     cargo deny --version 2>/dev/null || cargo install --locked cargo-deny
     for manifest in Cargo.toml firmware-example/Cargo.toml; do
         cargo deny --manifest-path $manifest --config deny.toml check licenses bans sources
     done
     if cargo deny fetch db; then
-        # Of fuzz/ what scripts/fuzz.sh has locked it to: the root's, and libFuzzer.
+        # fuzz/ is locked by scripts/fuzz.sh to the root's dependencies and libFuzzer.
         for manifest in Cargo.toml firmware-example/Cargo.toml fuzz/Cargo.toml; do
             cargo deny --manifest-path $manifest --config deny.toml check advisories
         done
     else
-        echo 'test.sh: the database of advisories cannot be reached: nothing is looked up there'
+        echo 'test.sh: the advisory database cannot be reached; advisories are not checked'
     fi
 fi
 
-say 'everything passed'
+say 'all tests passed'

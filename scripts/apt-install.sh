@@ -7,11 +7,11 @@ if [ "$(id -u)" = 0 ]; then
 elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then
     as_root='sudo -n'
 else
-    echo "apt-install: not root, and sudo is not to be had; as root: apt-get install $*" >&2
+    echo "apt-install: neither root nor sudo; run as root: apt-get install $*" >&2
     exit 1
 fi
 if ! command -v apt-get >/dev/null; then
-    echo "apt-install: no apt-get here; install by hand: $*" >&2
+    echo "apt-install: apt-get not found; install manually: $*" >&2
     exit 1
 fi
 echo "apt-install: apt-get install --no-install-recommends $*" >&2

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The median of five runs of `evolver bench`, with the range, and the processor's name.
+# Prints the median and range of five runs of `evolver bench`, and the processor's name.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo build --release --quiet

@@ -1,15 +1,15 @@
 #!/bin/sh
-# Every target of tests/fuzz guided by coverage: scripts/fuzz.sh [SECONDS [TARGET...]]
+# Coverage-guided fuzzing of the targets in tests/fuzz: scripts/fuzz.sh [SECONDS [TARGET...]]
 #
-# Starts from tests/fuzz-corpus, each target for 300 seconds unless told otherwise, as many at a
-# time as there are cores. An input that a reader fails on is left there as found-..., to be
-# committed with the correction. Needs a C++ compiler, since libFuzzer is C++; no nightly Rust. There
-# is no address sanitizer, since no reader has unsafe code.
+# Starts from tests/fuzz-corpus and runs each target for SECONDS (default 300), one target per core
+# at a time. Inputs on which a reader fails are saved there as found-...; commit them with the fix.
+# Needs a C++ compiler because libFuzzer is written in C++, but no nightly Rust. There is no address
+# sanitizer because no reader has unsafe code.
 set -eu
 cd "$(dirname "$0")/.."
 
 if ! command -v c++ >/dev/null && ! scripts/apt-install.sh g++; then
-    echo 'fuzz.sh: no C++ compiler, so no target is guided by coverage' >&2
+    echo 'fuzz.sh: no C++ compiler; skipping coverage-guided fuzzing' >&2
     [ "${CI:-}" != true ]
     exit
 fi
@@ -22,9 +22,9 @@ host=$(rustc -vV | sed -n 's/^host: //p')
 coverage='-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
     -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table
     -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1'
-# What the tests are locked to, and libFuzzer.
+# The dependencies of the tests, locked to the same versions, and libFuzzer.
 cp Cargo.lock fuzz/Cargo.lock
-# With --target, build scripts and macros are built without all this.
+# With --target, build scripts and macros are built without these flags.
 RUSTFLAGS="$coverage -Cdebug-assertions" cargo build --release \
     --manifest-path fuzz/Cargo.toml --target "$host"
 

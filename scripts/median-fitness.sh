@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Ten default evolutions a grid, seeds 1 to 10, and the median of their last generations' best
-# fitness. Runs that are complete are not done again.
+# Runs ten default evolutions per grid, seeds 1 to 10, and prints the median best fitness of their
+# last generations. Complete runs are not repeated.
 #
 #   scripts/median-fitness.sh 15x15 20x20
 set -euo pipefail

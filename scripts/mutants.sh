@@ -1,15 +1,15 @@
 #!/bin/sh
-# Mutation tests of controller, slots and link: scripts/mutants.sh [SHARDS]. Takes about an hour,
-# and cargo-mutants (cargo install cargo-mutants --locked).
+# Mutation tests of controller, slots and link: scripts/mutants.sh [SHARDS]. Takes about an hour and
+# needs cargo-mutants (cargo install cargo-mutants --locked).
 #
-# The outcomes are in target/mutants. Started again, it goes on behind the last complete shard;
-# for other sources, or other tests, remove that directory first.
+# Results are in target/mutants. A repeated call resumes after the last complete shard; after a
+# change to sources or tests, remove that directory first.
 set -eu
 cd "$(dirname "$0")/.."
 
 shards=${1:-16}
 outcomes=target/mutants/outcomes
-# One for all shards, so that dependencies are compiled once.
+# Shared by all shards, so that dependencies are compiled only once.
 CARGO_TARGET_DIR=$PWD/target/mutants/build
 export CARGO_TARGET_DIR
 
@@ -22,7 +22,7 @@ while [ "$shard" -lt "$shards" ]; do
         cargo mutants --package minimal-surprise-controller --package minimal-surprise-slots \
             --package minimal-surprise-link --shard "$shard/$shards" --sharding round-robin \
             --output "$this" || status=$?
-        # 2: mutants have survived. 3: tests have taken too long, which counts as caught.
+        # 2: mutants survived. 3: tests timed out, which counts as caught.
         case $status in
             0 | 2 | 3) touch "$this/complete" ;;
             *) exit "$status" ;;

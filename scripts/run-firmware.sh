@@ -1,10 +1,10 @@
 #!/bin/sh
-# Runs a firmware program under QEMU and prints what it logs: scripts/run-firmware.sh ELF
-# Cargo's runner in firmware-example.
+# Runs a firmware program in QEMU and prints its log: scripts/run-firmware.sh ELF
+# This is Cargo's runner in firmware-example.
 set -eu
 
 elf=$(realpath "$1")
 cd "$(dirname "$0")/.."
-# What an outer cargo for the target has set is not for the host.
+# An outer cargo may have set these for the target; they must not apply to the host.
 unset CARGO_BUILD_TARGET RUSTC RUSTC_BOOTSTRAP
 exec cargo run --quiet --package tests --bin run-firmware -- "$elf"

@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
-# A Slurm cluster of three one-core nodes on this machine, for tests; as root, on loopback only,
+# Runs a Slurm cluster of three one-core nodes on this machine for tests: as root, on loopback only,
 # without systemd and cgroups.
 #
 #   scripts/slurm-cluster.sh DIR PORT PORT PORT PORT
 #
-# DIR is made and holds everything; the ports, of the controller and the nodes, must be free. Says
-# "up" once the nodes are idle: then use it with SLURM_CONF=DIR/slurm.conf. Obeys lines on standard
-# input: "kill n2" ends a node and the jobs on it at once, "start n2" brings it back; each is
-# answered with "done". Where standard input ends, everything does, so nothing outlives a test that
-# was killed.
+# DIR is created and holds all files; the ports (of the controller and the nodes) must be free.
+# Prints "up" once the nodes are idle: then use the cluster with SLURM_CONF=DIR/slurm.conf. Reads
+# commands from standard input: "kill n2" ends a node and its jobs at once, "start n2" restarts it;
+# the reply to each is "done". When standard input ends, the cluster ends, so that nothing outlives
+# a test that was killed.
 set -eu
 
 [ $# = 5 ] || { echo "usage: $0 DIR PORT PORT PORT PORT" >&2 && exit 2; }
-# Slurm looks it up at every step, and waits long where nothing knows it.
+# Slurm looks up the host name at every step, and waits long if it cannot be resolved.
 if ! getent hosts "$(hostname -s)" >/dev/null; then
     echo "$0: unknown host $(hostname -s): expected a line for 127.0.0.1 in /etc/hosts" >&2
     exit 1
@@ -24,13 +24,14 @@ shift 2
 nodes='n1 n2 n3'
 host=$(hostname -s)
 conf=$dir/slurm.conf
-# Not exported: what ends the cluster would look like a part of it.
+# Not exported: the processes that end the cluster would look like a part of it.
 unset SLURM_CONF
 
-# The processes of this cluster and its jobs: a daemon hands SLURM_CONF down to all that it starts.
+# The processes of this cluster and its jobs: they inherit SLURM_CONF from the daemons.
 all() { grep -lzxF "SLURM_CONF=$conf" /proc/[0-9]*/environ 2>/dev/null | cut -d/ -f3; }
 
-# Those of a node: its daemons stand in its spool folder, its jobs have its name.
+# The processes of a node: its daemons run in its spool folder, its jobs have its name in the
+# environment.
 of_node() {
     for pid in $(all); do
         if [ "$(readlink "/proc/$pid/cwd")" = "$dir/spool-$1" ] ||
@@ -40,10 +41,10 @@ of_node() {
     done
 }
 
-# Ends them at once, and what they have started meanwhile.
+# Kills the listed processes, and any that they start meanwhile.
 end() {
     while pids=$("$@") && [ -n "$pids" ]; do
-        # shellcheck disable=SC2086 # one word a process
+        # shellcheck disable=SC2086 # one word per process
         kill -9 $pids 2>/dev/null || true
         sleep 0.05
     done
@@ -56,7 +57,7 @@ run() {
     log=$dir/log/$1
     shift
     SLURM_CONF=$conf "$@" >>"$log" 2>&1 </dev/null &
-    # Or the shell would report that it was killed.
+    # Otherwise the shell would report that it was killed.
     disown
 }
 
@@ -66,14 +67,14 @@ start_node() {
     cd "$dir"
 }
 
-# Tries until it is so, for half a minute at most.
+# Repeats a command until it succeeds, for at most half a minute.
 until_true() {
     give_up=$((SECONDS + 30))
     while [ $SECONDS -lt $give_up ]; do
         if "$@"; then return; fi
         sleep 0.1
     done
-    echo "$0: this does not come true: $*" >&2
+    echo "$0: timed out waiting for: $*" >&2
     for log in "$dir"/log/*; do tail -n 5 "$log" >&2; done
     exit 1
 }
@@ -81,7 +82,7 @@ until_true() {
 all_idle() { [ "$(SLURM_CONF=$conf sinfo --noheader --Node --format=%T 2>/dev/null | grep -cx idle)" = 3 ]; }
 
 mkdir "$dir"/{log,state,munge}
-# munged wants its socket to be in reach of all and its key of none.
+# munged requires that everyone can reach its socket and nobody its key.
 chmod 755 "$dir"
 chmod 700 "$dir/munge"
 (umask 077 && head -c 1024 /dev/urandom >"$dir/munge/key")
@@ -101,7 +102,7 @@ StateSaveLocation=$dir/state
 SlurmdSpoolDir=$dir/spool-%n
 SlurmctldPidFile=$dir/controller.pid
 SlurmdPidFile=$dir/%n.pid
-# Nothing that takes a cgroup, a database or MPI.
+# Nothing that needs a cgroup, a database or MPI.
 ProctrackType=proctrack/linuxproc
 TaskPlugin=task/none
 JobAcctGatherType=jobacct_gather/none
@@ -110,9 +111,9 @@ SwitchType=switch/none
 MpiDefault=none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_Core
-# A core each, whatever this machine has.
+# One core each, whatever this machine has.
 SlurmdParameters=config_overrides
-# A dead node is noticed soon, and used again as soon as it is back.
+# A dead node is detected quickly, and used again as soon as it is back.
 SlurmdTimeout=10
 ReturnToService=2
 SchedulerParameters=sched_interval=1,sched_min_interval=0,batch_sched_delay=0,bf_interval=1
@@ -142,7 +143,7 @@ while read -r verb node; do
     case $verb in
         kill) end of_node "$node" ;;
         start) start_node "$node" ;;
-        *) echo "$0: what is $verb?" >&2 && exit 2 ;;
+        *) echo "$0: unknown command $verb: expected kill or start" >&2 && exit 2 ;;
     esac
     echo 'done'
 done

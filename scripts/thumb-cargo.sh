@@ -2,17 +2,18 @@
 # Runs cargo for a Cortex-M4 or, with --target, another processor, e.g. in firmware-example:
 #
 #     ../scripts/thumb-cargo.sh build --release [--target thumbv7em-none-eabi]
-#     scripts/thumb-cargo.sh --compiler [--target …]       only finds the compiler and names it
+#     scripts/thumb-cargo.sh --compiler [--target …]       only finds the compiler and prints it
 #
-# The target's core library (std, if it has an operating system) comes from the first of these that works:
+# The target's core library (std for targets with an operating system) comes from the first of these
+# sources that works:
 #
 #   1. the Rust toolchain in use has it;
-#   2. rustup adds it (not tried with RUSTUP_TARGET_ADD=0, for those who know that it cannot);
+#   2. rustup adds it (skipped with RUSTUP_TARGET_ADD=0);
 #   3. the system's Rust builds it from source. With PROVIDE_TOOLS=1, Debian's packages for this
 #      are installed.
 #
-# Says on stderr which compiler that is: sizes and instruction counts differ between compilers.
-# Exits with 69 and says what to install if none of them works.
+# Prints the compiler to stderr, because sizes and instruction counts depend on it. If no source
+# works, prints what to install and exits with 69.
 set -eu
 
 target=thumbv7em-none-eabihf
@@ -45,7 +46,7 @@ add_target() {
     timeout 120 rustup target add "$target" >&2 && has_target
 }
 
-# Whether the system's Rust is there, new enough, and can build core for another target.
+# Checks whether the system's Rust exists, is new enough, and can build core for another target.
 has_system_rust() {
     [ -x /usr/bin/cargo ] && [ -x /usr/bin/rustc ] && command -v ld.lld >/dev/null || return 1
     [ -f "$(system rustc --print sysroot)/lib/rustlib/src/rust/library/core/Cargo.toml" ] || return 1
@@ -53,7 +54,7 @@ has_system_rust() {
     [ "$(printf '%s\n' "$version_min" "$version" | sort -V | head -n 1)" = "$version_min" ]
 }
 
-# A program of the system's Rust, free of what rustup and an outer cargo have set for theirs.
+# Runs a program of the system's Rust, without the variables that rustup or an outer cargo has set.
 system() {
     program=$1
     shift
@@ -81,7 +82,7 @@ elif has_system_rust || provide_system_rust; then
         --config "target.$target.rustflags=['-Clinker-flavor=ld.lld']" \
         "$@"
 else
-    say "no $library library for $target. Either of these provides it:"
+    say "no $library library for $target. Either of these commands installs it:"
     say "    rustup target add $target"
     say "    apt-get install --no-install-recommends $system_packages   (Rust $version_min or newer)"
     exit 69
