@@ -1,9 +1,9 @@
 #!/bin/sh
-# Builds an `evolver` that needs nothing of the system it runs on, linked statically with musl:
+# Builds an `evolver` that depends on no system library, linked statically with musl:
 #
 #     scripts/static-binary.sh [x86_64|aarch64]      default: this machine's processor
 #
-# Prints the path of the program. Needs rustup; the linker is the one that Rust ships.
+# Prints the path of the program. Needs rustup; uses the linker shipped with Rust.
 set -eu
 cd "$(dirname "$0")/.."
 
