@@ -1,5 +1,5 @@
-//! Says whether the target has SMLAD: stable Rust does not let a program ask for Arm's DSP
-//! extension, so it goes by the target's name. By another name the portable sums are used.
+//! Detects targets with SMLAD. Stable Rust cannot query Arm's DSP extension, so the target's name
+//! decides; all other targets use the portable sums.
 
 use std::env;
 

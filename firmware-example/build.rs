@@ -1,4 +1,4 @@
-//! Puts the memory layout where the linker looks for it, and names the linker scripts.
+//! Copies the memory layout to where the linker looks for it, and passes the linker scripts.
 
 use std::{env, fs, path::PathBuf};
 

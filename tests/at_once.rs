@@ -1,5 +1,5 @@
-//! Many processes started at once on one place: none fails, nothing is lost, and what they leave is
-//! what one leaves. With `TEST_ALL=1` thousands of times.
+//! Many processes started at once in one directory: none fails, nothing is lost, and they leave the
+//! same files as a single process. `TEST_ALL=1` repeats this thousands of times.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use tests::full;
 use tests::program::Evolver;
 
-/// Six runs of milliseconds, so that processes meet often.
+/// Six runs that take milliseconds, so that processes meet often.
 const SUITE: &str = "
 name = \"own\"
 
@@ -29,23 +29,23 @@ steps = 20
 
 const RUN: &str = "suite own.toml run --out suite --threads 1 --progress none";
 
-/// Longer than anything here takes.
+/// Longer than any operation here takes.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// The locks of a file system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Locks {
-    /// Every process sees those of all others.
+    /// Every process sees the locks of all others.
     Working,
-    /// It has none.
+    /// The file system has no locks.
     Missing,
-    /// A host does not see those of other hosts, and each process is on another host.
+    /// A host does not see the locks of other hosts, and each process is on a different host.
     OfOneHost,
 }
 
 const ALL_LOCKS: [Locks; 3] = [Locks::Working, Locks::Missing, Locks::OfOneHost];
 
-/// Stands before the C library, where there are no working locks.
+/// Overrides the C library's locks for file systems without working locks.
 const OTHER_LOCKS: &str = "
 #include <errno.h>
 #include <stdio.h>
@@ -64,7 +64,7 @@ int gethostname(char *name, size_t size) {
 }
 ";
 
-/// The library made of it, built once.
+/// The shared library built from it, once.
 fn other_locks() -> PathBuf {
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -82,7 +82,7 @@ fn other_locks() -> PathBuf {
     folder.path().join("locks.so")
 }
 
-/// How often something is done: less unless all cases are asked for.
+/// How often to repeat something: fewer times unless all cases are requested.
 fn times(reduced: usize, all: usize) -> usize {
     if full::all_cases() { all } else { reduced }
 }
@@ -105,7 +105,7 @@ fn command(evolver: &Evolver, locks: Locks, line: &str) -> Command {
     command
 }
 
-/// Starts all these, and waits for all.
+/// Starts all these commands, and waits for all of them.
 fn at_once(evolver: &Evolver, locks: Locks, lines: &[&str]) -> Vec<Output> {
     let start = |line: &&str| command(evolver, locks, line).spawn().expect("it starts");
     let started: Vec<Child> = lines.iter().map(start).collect();
@@ -121,8 +121,8 @@ fn assert_success(outputs: &[Output], what: &str) {
     }
 }
 
-/// Every file below a folder, hidden ones too, but for those that say by which command a run was
-/// made and how long it took.
+/// Every file below a folder, hidden ones too, except those with the command and the duration of a
+/// run.
 fn contents(evolver: &Evolver, folder: &str) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files
@@ -152,7 +152,7 @@ fn with_the_suite() -> Evolver {
 }
 
 #[test]
-fn six_processes_on_one_suite_all_succeed_and_leave_what_one_leaves() {
+fn six_processes_on_one_suite_all_succeed_and_leave_the_files_of_one() {
     let task = RUN.replace("suite own.toml run", "run-task --suite own.toml --shard");
     let task = |shard: &str| task.replace("--shard", &format!("--shard {shard}"));
     let tasks = ["0/2", "1/2", "0/1"].map(task);
@@ -181,7 +181,7 @@ fn six_processes_on_one_suite_all_succeed_and_leave_what_one_leaves() {
 }
 
 #[test]
-fn six_evolutions_of_one_name_each_get_a_directory_of_their_own() {
+fn six_evolutions_with_the_same_name_each_get_their_own_directory() {
     let evolve = "evolve --grid 8x8 --robots 20 --population 4 --generations 2 --repetitions 1 \
                   --steps 20 --seed 3 --threads 1 --progress none";
     for locks in ALL_LOCKS {
@@ -216,9 +216,9 @@ fn six_evolutions_of_one_name_each_get_a_directory_of_their_own() {
 }
 
 #[test]
-fn two_galleries_at_once_both_succeed_and_a_folder_of_the_users_stays() {
+fn two_galleries_at_once_both_succeed_and_the_users_folder_is_kept() {
     let evolver = with_the_suite();
-    // One that takes longer to show than a process takes to begin.
+    // A run that takes longer to show than a process takes to start.
     let long = "evolve --grid 12x12 --robots 40 --population 2 --generations 1 --repetitions 1 \
                 --steps 20000 --threads 1 --out long";
     for made in [RUN, long] {
@@ -252,7 +252,7 @@ fn two_galleries_at_once_both_succeed_and_a_folder_of_the_users_stays() {
     }
 }
 
-/// Sends a signal to a process of ours.
+/// Sends a signal to a child process.
 fn signal(name: &str, child: &Child) {
     let kill = format!("kill -{name} {}", child.id());
     let sent = Command::new("sh").args(["-c", &kill]).status();
@@ -260,7 +260,7 @@ fn signal(name: &str, child: &Child) {
 }
 
 #[test]
-fn a_run_that_a_stopped_process_holds_is_waited_for_and_it_is_said_who_holds_it() {
+fn a_run_held_by_a_stopped_process_is_waited_for_and_its_holder_is_named() {
     for (way, ends) in [
         (
             "run-task --suite own.toml --shard 0/1 --progress lines",
@@ -269,7 +269,7 @@ fn a_run_that_a_stopped_process_holds_is_waited_for_and_it_is_said_who_holds_it(
         ("suite own.toml run --progress json", "KILL"),
     ] {
         let evolver = Evolver::in_empty_folder();
-        // One run of a moment, long enough to be stopped in.
+        // One short run, long enough to be stopped.
         let long = SUITE
             .replace("runs = 6", "runs = 1")
             .replace("generations = 2", "generations = 100")
@@ -329,7 +329,7 @@ fn a_run_that_a_stopped_process_holds_is_waited_for_and_it_is_said_who_holds_it(
 }
 
 #[test]
-fn a_share_without_runs_is_done_at_once_also_where_there_is_no_suite_yet() {
+fn a_shard_without_runs_is_done_at_once_even_if_there_is_no_suite_yet() {
     let evolver = Evolver::in_empty_folder();
     evolver.write("own.toml", SUITE.replace("runs = 6", "runs = 1").as_bytes());
     let task = "run-task --suite own.toml --shard 1/2 --out new";

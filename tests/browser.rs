@@ -1,4 +1,4 @@
-//! The pages, opened from files in a headless Chromium that has no network.
+//! The pages, opened from files in a headless Chromium without a network.
 
 use minimal_surprise_evolution::finished_run::FinishedRun;
 use minimal_surprise_replay::page::page;
@@ -16,7 +16,7 @@ use tests::noisy_run::copy_noisy_run;
 use tests::program::{Evolver, Finished};
 use tests::tools::require;
 
-/// A folder with short runs in `runs`, by their names.
+/// A folder with short runs in `runs`, given by name.
 fn with_runs(runs: &[(&str, &str)]) -> Evolver {
     let evolver = Evolver::in_empty_folder();
     fs::create_dir(evolver.folder().join("runs")).unwrap();
@@ -30,7 +30,7 @@ fn with_runs(runs: &[(&str, &str)]) -> Evolver {
     evolver
 }
 
-/// Runs the program with the words of a line.
+/// Runs the program with the words of a line as arguments.
 fn run(evolver: &Evolver, line: &str) -> Finished {
     evolver.run(&line.split_whitespace().collect::<Vec<_>>())
 }
@@ -41,7 +41,7 @@ fn succeed(evolver: &Evolver, line: &str) -> Finished {
     run
 }
 
-/// 2 if the input cannot be used, 1 if a run is damaged.
+/// The exit code is 2 if the input cannot be used, 1 if a run is damaged.
 fn assert_refused(run: &Finished, code: i32, words: &[&str]) {
     assert_eq!(run.code, Some(code), "{run:?}");
     for word in words {
@@ -50,7 +50,7 @@ fn assert_refused(run: &Finished, code: i32, words: &[&str]) {
     assert_eq!(run.stderr.trim_end().lines().count(), 1, "{run:?}");
 }
 
-/// A browser; nothing if there is none and the test may be skipped.
+/// A browser; `None` if there is none and the test may be skipped.
 fn browser() -> Option<Browser> {
     require(chromium()).map(|chromium| Browser::start(&chromium))
 }
@@ -65,7 +65,7 @@ fn recording_of(evolver: &Evolver, run: &str) -> Recording {
     Recording::of_run(run, &FinishedRun::read(&path).unwrap(), &|| ()).unwrap()
 }
 
-/// Compares every kind of scene of some states with the page's.
+/// Compares every kind of scene of some states with those of the page.
 fn assert_same_scenes(browser: &mut Browser, recording: &Recording) {
     let steps = recording.steps();
     let states = [0, 1, 2, 127, 128, 129, steps / 2, steps - 1, steps];
@@ -93,7 +93,7 @@ fn checked(browser: &mut Browser) -> (String, String) {
 }
 
 #[test]
-fn the_page_shows_the_scenes_of_the_program_and_hashes_the_steps_of_the_run() {
+fn the_page_shows_the_same_scenes_as_the_program_and_hashes_the_steps_of_the_run() {
     let Some(mut browser) = browser() else { return };
     let flags = [
         ("c", "--seed 4 --steps 300"),
@@ -130,7 +130,7 @@ fn the_page_shows_the_scenes_of_the_program_and_hashes_the_steps_of_the_run() {
 }
 
 #[test]
-fn damaged_swarms_genomes_and_trajectories_say_what_their_steps_can_be_compared_with() {
+fn pages_of_damaged_swarms_genomes_and_trajectories_say_what_their_steps_can_be_compared_with() {
     let Some(mut browser) = browser() else { return };
     let evolver = with_runs(&[("run", "--seed 4 --steps 150")]);
     let finished = FinishedRun::read(&evolver.folder().join("runs/run")).unwrap();
@@ -179,7 +179,7 @@ fn damaged_swarms_genomes_and_trajectories_say_what_their_steps_can_be_compared_
 }
 
 #[test]
-fn a_page_whose_steps_are_not_those_of_the_run_says_so() {
+fn a_page_whose_steps_differ_from_the_run_says_so() {
     let Some(mut browser) = browser() else { return };
     let evolver = with_runs(&[("run", "--seed 4 --steps 40")]);
     let state: Value = serde_json::from_slice(&evolver.read("runs/run/final.json")).unwrap();
@@ -189,7 +189,7 @@ fn a_page_whose_steps_are_not_those_of_the_run_says_so() {
         .text("runs/run/final.json")
         .replace(recorded, &other);
     evolver.write("runs/run/final.json", changed.as_bytes());
-    // The program refuses such a run; a page may be changed later.
+    // The program refuses such a run, but a page may be changed later.
     assert_refused(
         &run(&evolver, "replay runs/run --html run.html"),
         1,
@@ -265,7 +265,7 @@ fn a_click_on_a_robot_shows_what_it_predicts_and_senses() {
     let misses: u32 =
         browser.evaluate("document.querySelectorAll('#views figure:nth-child(2) .miss').length");
     assert_eq!(misses, 14 - right);
-    // The same robot again: none.
+    // Clicking the same robot again deselects it.
     browser.click(x, y);
     browser.wait_for("replay.state().picked === null");
     browser.assert_quiet();
@@ -294,7 +294,7 @@ fn tab_order(browser: &mut Browser) -> Vec<String> {
     }
 }
 
-/// Presses keys and waits for what they bring about.
+/// Presses keys and waits for their effect.
 fn after(browser: &mut Browser, keys: &[&str], expression: &str) {
     for key in keys {
         browser.press(key);
@@ -303,7 +303,7 @@ fn after(browser: &mut Browser, keys: &[&str], expression: &str) {
 }
 
 #[test]
-fn the_replay_is_worked_by_the_keyboard_alone() {
+fn the_replay_works_with_the_keyboard_alone() {
     let Some(mut browser) = browser() else { return };
     let evolver = with_runs(&[("run", "--seed 4 --steps 90")]);
     succeed(&evolver, "replay runs/run --html run.html");
@@ -358,7 +358,7 @@ fn the_replay_is_worked_by_the_keyboard_alone() {
         &["t"],
         "document.documentElement.dataset.theme === 'dark'",
     );
-    // On a control, keys are the control's.
+    // Keys pressed on a control go to the control.
     let _: Value = browser.evaluate("document.getElementById('theme').focus(), null");
     after(
         &mut browser,
@@ -390,7 +390,7 @@ fn the_replay_is_worked_by_the_keyboard_alone() {
 }
 
 #[test]
-fn the_gallery_sorts_filters_and_opens_replays_by_the_keyboard() {
+fn the_gallery_sorts_filters_and_opens_replays_with_the_keyboard() {
     let Some(mut browser) = browser() else { return };
     let evolver = with_runs(&[
         ("one", "--seed 1 --steps 60"),
@@ -462,7 +462,7 @@ fn the_gallery_sorts_filters_and_opens_replays_by_the_keyboard() {
             "{control}: {reached:?}"
         );
     }
-    // From the last control on, runs; arrows go from one to the next.
+    // After the last control come the runs; arrow keys move from one to the next.
     let _: Value = browser.evaluate("document.getElementById('sort').focus(), null");
     browser.press("Tab");
     browser.press("ArrowRight");
@@ -567,7 +567,7 @@ fn a_long_run_of_a_thousand_robots_opens_and_plays() {
 }
 
 #[test]
-fn what_cannot_be_shown_is_refused_and_nothing_is_overwritten() {
+fn input_that_cannot_be_shown_is_refused_and_nothing_is_overwritten() {
     let evolver = with_runs(&[("run", "--seed 4 --steps 30")]);
     let refused_with = |code: i32, line: &str, words: &[&str]| {
         let before = evolver.files();
@@ -634,10 +634,10 @@ fn what_cannot_be_shown_is_refused_and_nothing_is_overwritten() {
             &format!("replay {name} --html out.html"),
             &[name, word],
         );
-        // To a gallery, a run that cannot be shown is one bad run among all that it was to show.
+        // For a gallery, a run that cannot be shown is one bad run among several.
         refused_with(1, &format!("gallery {name} --out new"), &[name, word]);
     }
-    // Among others, a run that has not ended is left out.
+    // Among other runs, an unfinished run is left out.
     fs::rename(
         evolver.folder().join("unfinished"),
         evolver.folder().join("runs/unfinished"),

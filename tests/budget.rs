@@ -1,11 +1,11 @@
-//! What the controller costs a robot, and that no panic is linked into one.
+//! The cost of the controller on a robot, and that no panic is linked into the firmware.
 //!
 //! `cargo test -p tests --test budget -- --show-output` prints the table.
 
 use tests::firmware::{self, flash_bytes, link};
 use tests::tools::{Missing, require};
 
-/// The keys of `budget.toml`, and what they are called in README's table.
+/// The keys of `budget.toml`, and their names in the README's table.
 const ROWS: [(&str, &str); 9] = [
     ("step_instructions", "one control step, instructions"),
     (
@@ -49,7 +49,7 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// What `budget.toml` allows, in the order of [`ROWS`].
+/// The limits in `budget.toml`, in the order of [`ROWS`].
 fn budget() -> Vec<u32> {
     let text = text("budget.toml");
     let lines: Vec<(&str, &str)> = text
@@ -65,7 +65,7 @@ fn budget() -> Vec<u32> {
     ROWS.iter().map(|(key, _)| most(*key)).collect()
 }
 
-/// README's table of costs, and the compiler that it names.
+/// The README's table of costs, and the compiler that it names.
 fn readme() -> (Vec<Row>, String) {
     let text = text("../README.md");
     let (_, cost) = text.split_once("### Cost").expect("a section on costs");
@@ -85,7 +85,7 @@ fn readme() -> (Vec<Row>, String) {
     (rows, format!("rustc {} ", &compiler[..end.unwrap_or(0)]))
 }
 
-/// The compiler, and what was measured in the order of [`ROWS`].
+/// The compiler, and the values measured, in the order of [`ROWS`].
 fn measure() -> Result<(String, Vec<u32>), Missing> {
     let firmware = firmware::build()?;
     let lines = firmware.run("budget")?;
@@ -107,7 +107,7 @@ fn measure() -> Result<(String, Vec<u32>), Missing> {
 }
 
 #[test]
-fn the_controller_stays_within_its_budget_and_the_readme_says_what_it_costs() {
+fn the_controller_stays_within_its_budget_and_the_readme_states_its_costs() {
     let Some((compiler, measured)) = require(measure()) else {
         return;
     };
@@ -126,7 +126,7 @@ fn the_controller_stays_within_its_budget_and_the_readme_says_what_it_costs() {
     for row in &rows {
         assert!((1..=row.most).contains(&row.measured), "{row:?}");
     }
-    // Another compiler makes another program, and so does another core library.
+    // A different compiler or core library produces a different program.
     let (in_readme, its_compiler) = readme();
     if compiler.starts_with(&its_compiler) && !compiler.contains("from its source") {
         assert_eq!(in_readme, rows, "README.md is not up to date");
@@ -134,7 +134,7 @@ fn the_controller_stays_within_its_budget_and_the_readme_says_what_it_costs() {
 }
 
 #[test]
-fn the_readme_names_the_limits_and_no_figure_beyond_them() {
+fn the_readme_names_the_limits_and_no_value_exceeds_them() {
     let (rows, _) = readme();
     let whats: Vec<&str> = rows.iter().map(|row| row.what.as_str()).collect();
     assert_eq!(whats, ROWS.map(|(_, what)| what));
@@ -165,7 +165,7 @@ fn no_panic_is_linked_into_a_robot() {
         return;
     };
     assert!(robot.success, "{}", robot.messages);
-    // One index that nothing checks, or the above means nothing.
+    // With an unchecked index it must fail, otherwise the check above proves nothing.
     let Some(panics) = require(link("probe", "panics")) else {
         return;
     };

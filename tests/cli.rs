@@ -8,7 +8,7 @@ use std::fs;
 use std::time::{Duration, Instant};
 use tests::program::{Evolver, Finished};
 
-/// Flags of an evolution that takes a moment.
+/// Flags of a short evolution.
 const SHORT: [(&str, &str); 6] = [
     ("--robots", "12"),
     ("--grid", "7x6"),
@@ -21,7 +21,7 @@ const SHORT: [(&str, &str); 6] = [
 /// Longest wait for a process.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Waits for something that another process does.
+/// Waits until a condition holds that another process brings about.
 fn wait_until(what: &str, holds: impl Fn() -> bool) {
     let started = Instant::now();
     while !holds() {
@@ -38,7 +38,7 @@ fn events(run: &Finished) -> Vec<serde_json::Value> {
         .collect()
 }
 
-/// A short evolution with more flags, which go before those of the same name.
+/// A short evolution with more flags, which override those with the same name.
 fn short(flags: &[&str]) -> Vec<String> {
     let defaults = SHORT.iter().filter(|(flag, _)| !flags.contains(flag));
     let defaults = defaults.flat_map(|&(flag, value)| [flag, value]);
@@ -50,7 +50,7 @@ fn short(flags: &[&str]) -> Vec<String> {
         .collect()
 }
 
-/// Refused with one message that has all these words, exit code 2, and nothing written.
+/// Asserts one message with all these words, exit code 2, and that nothing is written.
 fn assert_refused(evolver: &Evolver, arguments: &[String], words: &[&str]) {
     let before = evolver.files();
     let run = evolver.run(arguments);
@@ -105,7 +105,7 @@ fn an_evolution_ends_with_a_picture_a_hash_and_a_genome_and_can_be_repeated_from
 }
 
 #[test]
-fn a_run_directory_holds_what_it_should() {
+fn a_run_directory_holds_its_files() {
     let evolver = Evolver::in_empty_folder();
     let run = evolver.run(&short(&["--seed", "7", "--out", "run"]));
     let names = [
@@ -160,7 +160,7 @@ fn no_run_is_ever_overwritten() {
 }
 
 #[test]
-fn bad_flags_get_one_message_with_the_flag_the_value_and_what_is_valid() {
+fn bad_flags_get_one_message_with_the_flag_the_value_and_the_valid_range() {
     let evolver = Evolver::in_empty_folder();
     let cases: [(&[&str], &[&str]); 25] = [
         (&["--grid", "2x15"], &["--grid", "2x15", "from 3 to"]),
@@ -245,7 +245,7 @@ fn bad_flags_get_one_message_with_the_flag_the_value_and_what_is_valid() {
 }
 
 #[test]
-fn bad_files_get_one_message_with_the_line_the_value_and_what_is_valid() {
+fn bad_files_get_one_message_with_the_line_the_value_and_the_valid_range() {
     let evolver = Evolver::in_empty_folder();
     let cases = [
         (
@@ -283,7 +283,7 @@ fn bad_files_get_one_message_with_the_line_the_value_and_what_is_valid() {
 }
 
 #[test]
-fn a_flag_goes_before_the_file() {
+fn a_flag_overrides_the_file() {
     let evolver = Evolver::in_empty_folder();
     evolver.write(
         "swarm.toml",
@@ -375,7 +375,7 @@ fn from_starts_with_the_genome_and_its_mutants() {
 }
 
 #[test]
-fn an_output_directory_that_cannot_be_written_is_refused() {
+fn an_output_directory_that_is_not_writable_is_refused() {
     let evolver = Evolver::in_empty_folder();
     evolver.write("file", b"");
     assert_refused(&evolver, &short(&["--out", "file/run"]), &["--out", "file"]);
@@ -439,7 +439,7 @@ fn only_an_unchanged_run_is_resumed() {
 }
 
 #[test]
-fn the_first_signal_ends_cleanly_and_says_how_to_go_on() {
+fn the_first_signal_ends_cleanly_and_says_how_to_resume() {
     let evolver = Evolver::in_empty_folder();
     let arguments = |out| short(&["--seed", "9", "--generations", "150", "--out", out]);
     let whole = evolver.run(&arguments("whole"));
@@ -466,7 +466,7 @@ fn the_first_signal_ends_cleanly_and_says_how_to_go_on() {
     }
 }
 
-/// A generation that takes longer than any test waits.
+/// A generation that takes longer than a test waits.
 const ENDLESS: &str = "--grid 20x20 --robots 100 --population 50 --repetitions 10 \
                        --steps 3000000 --threads 1 --seed 1 --out endless";
 
@@ -510,7 +510,7 @@ fn a_signal_that_the_caller_ignores_stays_ignored() {
         let line = format!("trap '' {signal}; {program} {work} {signal} & echo $! > pid; wait $!");
         done(signal, line, signal);
     }
-    // Shells ignore SIGINT for their jobs in the background.
+    // Shells ignore SIGINT for background jobs.
     let job = format!("{program} {work} job & echo $! > pid; wait $!");
     done("job", job, "INT");
     let nohup = format!("nohup {program} {work} nohup > out 2>&1 & echo $! > pid; wait $!");
@@ -519,7 +519,7 @@ fn a_signal_that_the_caller_ignores_stays_ignored() {
 
 #[cfg(unix)]
 #[test]
-fn work_whose_reader_goes_stops_unfinished_and_says_how_to_go_on() {
+fn a_run_whose_output_is_closed_stops_unfinished_and_says_how_to_resume() {
     let evolver = Evolver::in_empty_folder();
     let program = evolver.program().display();
     let work = short(&["--generations", "150"]).join(" ");
@@ -543,7 +543,7 @@ fn work_whose_reader_goes_stops_unfinished_and_says_how_to_go_on() {
     unfinished(&line, "head -1", "evolve --resume cut");
     let resumed = evolver.run(&["evolve", "--resume", "cut"]);
     assert_eq!(hash_of(&resumed), hash_of(&whole));
-    // What is drawn is shown before the work begins.
+    // The drawing is shown before the work begins.
     unfinished(
         &format!("{work} --out drawn"),
         "sleep 0",
@@ -604,7 +604,7 @@ fn a_full_disk_behind_standard_output_is_a_failure_and_no_panic() {
     let said = String::from_utf8_lossy(&piped.stderr);
     assert_eq!(piped.status.code(), Some(1), "{said}");
     assert!(said.contains("evolve --resume other-2"), "{said}");
-    // Nor is standard error anything to panic about.
+    // A full standard error does not panic either.
     let lines = short(&["--seed", "1", "--progress", "lines", "--out"]).join(" ");
     for (index, place) in ["/dev/full", "&-"].into_iter().enumerate() {
         for (command, code) in [
@@ -622,7 +622,7 @@ fn a_full_disk_behind_standard_output_is_a_failure_and_no_panic() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn exit_codes_tell_bad_input_failures_and_interruptions_apart() {
+fn exit_codes_distinguish_bad_input_failures_and_interruptions() {
     let evolver = Evolver::in_empty_folder();
     evolver.run(&short(&["--seed", "1", "--out", "run"]));
     evolver.run(&short(&["--seed", "1", "--out", "cut"]));
@@ -633,7 +633,7 @@ fn exit_codes_tell_bad_input_failures_and_interruptions_apart() {
     let cases = [
         ("--version", 0),
         ("classify run", 0),
-        // Something broke: a run, the disk.
+        // A failure: of a run or of the disk.
         ("classify cut", 1),
         ("inspect cut", 1),
         ("replay cut --svg a.svg", 1),
@@ -643,7 +643,7 @@ fn exit_codes_tell_bad_input_failures_and_interruptions_apart() {
         ("evolve --resume cut", 1),
         ("inspect /proc/self/mem", 1),
         ("replay run --svg /dev/full --overwrite", 1),
-        // What was given cannot be used.
+        // The input cannot be used.
         ("nosuch", 2),
         ("classify --nosuch", 2),
         ("classify nothing", 2),
@@ -726,7 +726,7 @@ fn completions_are_printed_for_every_shell() {
 }
 
 #[test]
-fn names_in_files_stand_as_they_are_and_numbers_are_decimal() {
+fn names_in_files_are_unquoted_and_numbers_are_decimal() {
     let evolver = Evolver::in_empty_folder();
     evolver.write("swarm.toml", b"out = \"my_run\"\nsteps = 2_0\n");
     let arguments = [
@@ -758,7 +758,7 @@ fn short_flags_without(flag: &str) -> Vec<&'static str> {
 fn a_directory_is_a_run_as_soon_as_it_has_its_name() {
     let evolver = Evolver::in_empty_folder();
     let (mut tried, mut resumed) = (0, 0);
-    // A busy machine takes longer to begin.
+    // A busy machine takes longer to start.
     while tried < 60 || (resumed == 0 && tried < 2000) {
         let wait_us = 500 * tried;
         tried += 1;
@@ -781,7 +781,7 @@ fn a_directory_is_a_run_as_soon_as_it_has_its_name() {
 
 #[cfg(unix)]
 #[test]
-fn a_report_whose_reader_goes_ends_quietly() {
+fn a_report_whose_output_is_closed_ends_quietly() {
     let evolver = Evolver::in_empty_folder();
     evolver.run(&short(&["--seed", "1", "--out", "run"]));
     let program = evolver.program().display();
@@ -792,7 +792,7 @@ fn a_report_whose_reader_goes_ends_quietly() {
         let said = String::from_utf8_lossy(&piped.stderr);
         assert_eq!(said, "code 0\n", "{command}");
     }
-    // What went wrong is said nevertheless.
+    // Errors are reported nevertheless.
     evolver.run(&short(&["--seed", "1", "--out", "cut"]));
     evolver.write("cut/final.json", b"{");
     let line = format!("{{ {program} gallery . --out pages; echo code $? >&2; }} | sleep 0");
@@ -803,7 +803,7 @@ fn a_report_whose_reader_goes_ends_quietly() {
 }
 
 #[test]
-fn commands_that_are_shown_can_be_copied_whatever_the_name() {
+fn printed_commands_can_be_copied_for_any_name() {
     let evolver = Evolver::in_empty_folder();
     let run = evolver.run(&short(&["--seed", "1", "--out", "it's my run"]));
     let hint = run

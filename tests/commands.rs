@@ -1,4 +1,4 @@
-//! The commands that look at what has evolved, run as a user would run them.
+//! The commands that analyse evolved genomes, run as a user would run them.
 
 use embedded_storage::nor_flash::NorFlash;
 use firmware_example::memory_flash::MemoryFlash;
@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tests::program::{Evolver, Finished};
 
-/// A line of four, a pair, and two robots that are in nothing but dispersion.
+/// A line of four, a pair, and two robots that are only in dispersion.
 const DRAWING: &str = "
     ▲········
     ·········
@@ -58,7 +58,7 @@ fn assert_refused(run: &Finished, words: &[&str]) {
 }
 
 #[test]
-fn classify_names_what_a_drawing_shows_and_draws_the_members_filled() {
+fn classify_names_the_structures_of_a_drawing_and_draws_their_members_filled() {
     let evolver = Evolver::in_empty_folder();
     evolver.write("swarm.txt", DRAWING.as_bytes());
     let shown = evolver.run(&["classify", "swarm.txt"]);
@@ -87,7 +87,7 @@ fn classify_names_what_a_drawing_shows_and_draws_the_members_filled() {
 }
 
 #[test]
-fn classify_measures_a_run_and_agrees_with_what_evolve_wrote() {
+fn classify_measures_a_run_and_agrees_with_the_files_of_evolve() {
     let evolver = with_a_run(&[]);
     let found = json(&evolver.run(&["classify", "run", "--json"]));
     let written: Value = serde_json::from_slice(&evolver.read("run/final.json")).unwrap();
@@ -119,7 +119,7 @@ fn classify_measures_a_run_and_agrees_with_what_evolve_wrote() {
 }
 
 #[test]
-fn states_that_cannot_be_are_refused_with_their_line() {
+fn impossible_states_are_refused_with_their_line() {
     let evolver = Evolver::in_empty_folder();
     let text = fixture_text("c/agent_trajectory");
     let lines: Vec<&str> = text.lines().collect();
@@ -156,7 +156,7 @@ fn states_that_cannot_be_are_refused_with_their_line() {
 }
 
 #[test]
-fn final_states_that_cannot_be_are_refused() {
+fn impossible_final_states_are_refused() {
     let evolver = with_a_run(&[]);
     let text = evolver.text("run/final.json");
     let good: Value = serde_json::from_str(&text).unwrap();
@@ -226,7 +226,7 @@ fn evaluate_gives_a_table_over_grids_noise_levels_and_swarm_sizes() {
 }
 
 #[test]
-fn evaluate_refuses_what_cannot_be() {
+fn evaluate_refuses_impossible_settings() {
     let evolver = with_a_run(&[]);
     let run = |flags: &[&str]| evolver.run(&[&["evaluate", "run/best.genome"], flags].concat());
     assert_refused(&run(&["--starts", "0"]), &["--starts", "0", "from 1"]);
@@ -247,7 +247,7 @@ fn evaluate_refuses_what_cannot_be() {
 }
 
 #[test]
-fn damage_gives_the_rows_of_the_papers_tables() {
+fn damage_prints_the_rows_of_the_papers_tables() {
     let evolver = with_a_run(&[]);
     let damage = |flags: &str| {
         let arguments: Vec<&str> = flags.split_whitespace().collect();
@@ -279,7 +279,7 @@ fn damage_gives_the_rows_of_the_papers_tables() {
 }
 
 #[test]
-fn damage_refuses_what_cannot_be() {
+fn damage_refuses_impossible_settings() {
     let evolver = with_a_run(&[]);
     let damage = |flags: &str| {
         let arguments: Vec<&str> = flags.split_whitespace().collect();
@@ -306,7 +306,7 @@ fn damage_refuses_what_cannot_be() {
 }
 
 #[test]
-fn genome_text_becomes_genome_files_and_says_what_rounding_did() {
+fn genome_text_is_converted_to_genome_files_and_rounding_is_reported() {
     let evolver = Evolver::in_empty_folder();
     for model in ["a", "b", "c", "c-partly-predefined"] {
         let path = |name: &str| fixture(model).join(name).to_string_lossy().into_owned();
@@ -353,7 +353,7 @@ fn genome_text_becomes_genome_files_and_says_what_rounding_did() {
 }
 
 #[test]
-fn genome_text_that_is_not_is_refused_with_its_line() {
+fn invalid_genome_text_is_refused_with_its_line() {
     let evolver = Evolver::in_empty_folder();
     let prediction = fixture("c/prediction_genomes")
         .to_string_lossy()
@@ -382,12 +382,12 @@ fn genome_text_that_is_not_is_refused_with_its_line() {
 }
 
 #[test]
-fn one_generation_is_imported_whatever_the_others_are_like() {
+fn one_generation_is_imported_even_if_others_are_invalid() {
     let evolver = Evolver::in_empty_folder();
     for file in ["action_genomes", "prediction_genomes"] {
         let text = fixture_text(&format!("c/{file}"));
         let lines: Vec<&str> = text.lines().collect();
-        // Generation 1 is not numbers, and generation 2 lacks its last row.
+        // Generation 1 is not numeric, and generation 2 lacks its last row.
         let spoilt = [&lines[..4], &["x"; 3], &lines[7..10]].concat();
         evolver.write(file, spoilt.join("\n").as_bytes());
     }
@@ -412,7 +412,7 @@ fn one_generation_is_imported_whatever_the_others_are_like() {
 }
 
 #[test]
-fn an_exported_trajectory_is_classified_as_its_run_is() {
+fn an_exported_trajectory_is_classified_like_its_run() {
     let evolver = with_a_run(&[]);
     let flags = [
         "export",
@@ -431,7 +431,7 @@ fn an_exported_trajectory_is_classified_as_its_run_is() {
 }
 
 #[test]
-fn evaluate_takes_a_runs_conditions_unless_others_are_given() {
+fn evaluate_uses_a_runs_conditions_unless_others_are_given() {
     let evolver = with_a_run(&["--grid", "11x18", "--robots", "90", "--noise", "0.05"]);
     for genome in ["run", "run/best.genome"] {
         let table = json(&evolver.run(&["evaluate", genome, "--starts", "2", "--json"]));
@@ -449,7 +449,7 @@ fn evaluate_takes_a_runs_conditions_unless_others_are_given() {
 }
 
 #[test]
-fn a_picture_from_the_terminal_is_classified_as_its_run_is() {
+fn a_drawing_from_the_terminal_is_classified_like_its_run() {
     let evolver = with_a_run(&[]);
     let shown = evolver.run(&["classify", "run"]);
     let picture: Vec<&str> = shown.stdout.lines().take(15).collect();
@@ -470,7 +470,7 @@ fn a_picture_from_the_terminal_is_classified_as_its_run_is() {
     );
 }
 
-/// A program that prints the bytes of an exported genome, compiled and run.
+/// Compiles and runs a program that prints the bytes of an exported genome.
 fn printed_by(evolver: &Evolver, compiler: &str, arguments: &[&str]) -> Vec<u8> {
     let run = |program: &Path, arguments: &[&str]| {
         let mut command = std::process::Command::new(program);
@@ -523,7 +523,7 @@ fn an_exported_genome_has_the_same_bytes_in_c_and_rust() {
 }
 
 #[test]
-fn an_exported_genome_goes_to_a_chip_raw_or_as_intel_hex() {
+fn an_exported_genome_can_be_raw_or_intel_hex() {
     let evolver = with_a_run(&[]);
     let container = evolver.read("run/best.genome");
     let export = |more: &str| {
@@ -539,7 +539,7 @@ fn an_exported_genome_goes_to_a_chip_raw_or_as_intel_hex() {
         "probe-rs download --chip STM32F405RGTx --binary-format bin --base-address 0x0800c000 \
          raw.bin\n"
     );
-    // Without a file, the genome file is the raw form itself.
+    // Without an output file, the genome file itself is the raw form.
     let raw = export("bin");
     assert!(raw.stderr.ends_with(" run/best.genome\n"), "{raw:?}");
 
@@ -578,7 +578,7 @@ fn an_exported_genome_goes_to_a_chip_raw_or_as_intel_hex() {
 }
 
 #[test]
-fn an_exported_slot_is_run_by_a_robot_and_goes_where_its_board_has_slots() {
+fn an_exported_slot_is_run_by_a_robot_and_placed_at_its_boards_slots() {
     let evolver = with_a_run(&[]);
     let container = evolver.read("run/best.genome");
     let export = |more: &str| {
@@ -626,7 +626,7 @@ fn an_exported_slot_is_run_by_a_robot_and_goes_where_its_board_has_slots() {
 }
 
 #[test]
-fn export_refuses_what_is_no_genome_and_where_it_does_not_fit() {
+fn export_refuses_invalid_genomes_and_places_where_they_do_not_fit() {
     let evolver = with_a_run(&[]);
     evolver.write("damaged.genome", &evolver.read("run/best.genome")[..500]);
     let refused = |arguments: &str, words: &[&str]| {
@@ -660,7 +660,7 @@ fn export_refuses_what_is_no_genome_and_where_it_does_not_fit() {
 }
 
 #[test]
-fn every_command_calls_a_damaged_run_damaged_and_a_folder_without_one_bad_input() {
+fn every_command_reports_a_damaged_run_as_damaged_and_a_folder_without_a_run_as_bad_input() {
     let evolver = with_a_run(&[]);
     fs::create_dir(evolver.folder().join("empty")).unwrap();
     let commands = [

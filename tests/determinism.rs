@@ -1,4 +1,4 @@
-//! One seed, one result: whatever the threads, the build, the interruptions.
+//! One seed gives one result, independent of threads, builds and interruptions.
 
 use minimal_surprise_sim::Path;
 use minimal_surprise_sim::engine::PATH_VARIABLE;
@@ -26,11 +26,11 @@ const EVOLUTION: [&str; 15] = [
     "31",
 ];
 
-/// Its hash, here and everywhere.
+/// Its hash on every machine.
 const EVOLUTION_HASH: &str = "5af79e9f6d39fb2448edb30f7dd788f90428940f44d6386844b6a4908b381b37";
 
-/// Two evolutions whose hashes are pinned: fixed seeds give the same results in every version that
-/// does not say otherwise in the change log.
+/// Two evolutions whose hashes are pinned: fixed seeds give the same results in every version,
+/// unless the change log says otherwise.
 const PINNED: [(&[&str], &str); 2] = [
     (
         &[
@@ -73,7 +73,7 @@ fn hash(evolver: &Evolver, arguments: &[&str], extra: &[&str]) -> String {
     evolver.text("run/DONE").trim().to_owned()
 }
 
-/// Every file of the run but those that say by which command and how long.
+/// Every file of the run except those with its command and duration.
 fn contents(evolver: &Evolver) -> Vec<(String, String)> {
     let files = evolver.files().into_iter();
     files

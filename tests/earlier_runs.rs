@@ -1,4 +1,4 @@
-//! What the first release left behind is named, read and resumed as it was.
+//! Files of the first release keep their names, can be read and can be resumed.
 
 use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tests::program::Evolver;
 
-/// Six short runs, and what made each besides [`SHORT`].
+/// Six short runs, and the flags of each in addition to [`SHORT`].
 const RUNS: [(&str, &[&str]); 6] = [
     ("model-a", &["--sensor-model", "a"]),
     ("model-b", &["--sensor-model", "b"]),
@@ -42,7 +42,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// The program beside everything of the first release.
+/// The program in a folder with all files of the first release.
 fn evolver() -> Evolver {
     let evolver = Evolver::in_empty_folder();
     copy(&fixtures(), evolver.folder());
@@ -71,7 +71,7 @@ fn six_short_runs_end_with_the_hashes_of_the_first_release() {
         assert_eq!(made.code, Some(0), "{name}: {made:?}");
         for file in ["DONE", "best.genome", "generations.csv", "config.toml"] {
             let [first, again] = [name, "again"].map(|run| evolver.read(&format!("{run}/{file}")));
-            // The path of the ancestor is as it was given.
+            // The path of the ancestor is stored as it was given.
             assert!(
                 first == again || (name, file) == ("from", "config.toml"),
                 "{name}: {file}"
@@ -114,7 +114,7 @@ fn an_unfinished_run_of_the_first_release_is_resumed() {
 }
 
 #[test]
-fn genomes_of_the_first_release_are_read_and_written_to_the_byte() {
+fn genomes_of_the_first_release_are_read_and_written_byte_for_byte() {
     for (name, _) in RUNS {
         let file = fs::read(fixtures().join(name).join("best.genome")).unwrap();
         let encoded = EncodedGenome::decode(&file).unwrap();

@@ -1,4 +1,4 @@
-//! The lines that the README gives to those who embed the controller, built as they stand.
+//! Builds the README's code for embedding the controller, unchanged.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -6,7 +6,7 @@ use std::path::Path;
 use tests::firmware::{build_in, target_dir};
 use tests::tools::require;
 
-/// The files in the README: fenced blocks whose first line is a comment with a file's name.
+/// The files in the README: fenced blocks whose first line is a comment with a file name.
 fn files(readme: &str) -> Vec<(&str, &str)> {
     let blocks = readme.split("\n```").skip(1).step_by(2);
     let named = blocks.filter_map(|block| {
@@ -19,7 +19,7 @@ fn files(readme: &str) -> Vec<(&str, &str)> {
 }
 
 #[test]
-fn the_readmes_embedding_lines_build_outside_the_repository() {
+fn the_readmes_embedding_code_builds_outside_the_repository() {
     let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let readme = fs::read_to_string(repository.join("README.md")).unwrap();
     let folder = tempfile::tempdir().unwrap();

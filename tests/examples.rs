@@ -1,4 +1,4 @@
-//! The examples of the libraries run, and show what they are there to show.
+//! The examples of the libraries run and show what they claim.
 
 use escargot::CargoBuild;
 use std::path::Path;
@@ -18,7 +18,7 @@ fn lines_of(example: &str) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// The number at the end of a line, without what follows it.
+/// The number after `prefix` in a line.
 fn number(line: &str, prefix: &str) -> f64 {
     let rest = line.split_once(prefix).map_or("", |(_, rest)| rest);
     let digits = rest.split(' ').next().unwrap_or_default();
@@ -28,7 +28,7 @@ fn number(line: &str, prefix: &str) -> f64 {
 }
 
 #[test]
-fn a_fitness_of_ones_own_is_what_swarms_are_selected_for() {
+fn swarms_are_selected_for_a_custom_fitness() {
     let lines = lines_of("own_fitness");
     assert_eq!(lines.len(), 15, "{lines:?}");
     let [first, last] = [&lines[0], &lines[14]].map(|line| number(line, ": "));
@@ -36,7 +36,7 @@ fn a_fitness_of_ones_own_is_what_swarms_are_selected_for() {
 }
 
 #[test]
-fn a_selection_of_ones_own_and_another_optimiser_drive_the_population() {
+fn a_custom_selection_and_another_optimiser_drive_the_population() {
     for example in ["own_selection", "ask_tell"] {
         let lines = lines_of(example);
         assert_eq!(lines.len(), 15, "{example}: {lines:?}");
@@ -46,7 +46,7 @@ fn a_selection_of_ones_own_and_another_optimiser_drive_the_population() {
 }
 
 #[test]
-fn an_analysis_of_ones_own_sees_every_step_of_a_finished_run() {
+fn a_custom_analysis_sees_every_step_of_a_finished_run() {
     let lines = lines_of("own_analysis");
     assert_eq!(lines.len(), 4, "{lines:?}");
     for line in &lines {
@@ -55,7 +55,7 @@ fn an_analysis_of_ones_own_sees_every_step_of_a_finished_run() {
 }
 
 #[test]
-fn a_structure_of_ones_own_is_measured_beside_the_papers() {
+fn a_custom_structure_is_measured_alongside_the_papers() {
     let lines = lines_of("own_structure");
     assert_eq!(lines.len(), 3, "{lines:?}");
     assert!(

@@ -1,5 +1,5 @@
-//! The text files of the program that the paper's authors published, in `fixtures/exchange`: read,
-//! run again, and written.
+//! The text files of the program published by the paper's authors, in `fixtures/exchange`: read,
+//! rerun and written.
 
 use minimal_surprise_controller::{Controller, Prediction, SensorModel, Template, Topology};
 use minimal_surprise_sim::exchange::{
@@ -98,7 +98,7 @@ fn the_genomes_of_all_four_samples_are_imported() {
 }
 
 #[test]
-fn imported_genomes_run_again_from_the_recorded_starts_end_as_recorded() {
+fn imported_genomes_rerun_from_the_recorded_starts_end_as_recorded() {
     let (mut runs, mut same, mut close) = (0, 0, 0);
     for sample in samples() {
         for (imported, agents) in sample.genomes().iter().zip(sample.agents()) {
@@ -124,7 +124,7 @@ fn imported_genomes_run_again_from_the_recorded_starts_end_as_recorded() {
 }
 
 #[test]
-fn the_trajectory_is_read_its_end_named_and_its_run_repeated() {
+fn the_trajectory_is_read_its_structure_named_and_its_run_repeated() {
     let [_, _, sample, _] = samples();
     let trajectory = Trajectory::read(&sample.text("agent_trajectory")).unwrap();
     assert_eq!(trajectory.steps(), 500);
@@ -171,7 +171,7 @@ fn the_trajectory_is_read_its_end_named_and_its_run_repeated() {
 }
 
 #[test]
-fn a_trajectory_that_was_read_is_written_as_it_was() {
+fn a_trajectory_is_written_as_it_was_read() {
     let [_, _, sample, _] = samples();
     let text = sample.text("agent_trajectory");
     let mut written = Vec::new();
@@ -181,7 +181,7 @@ fn a_trajectory_that_was_read_is_written_as_it_was() {
 }
 
 #[test]
-fn a_trajectory_that_we_wrote_is_read_back_to_the_same_states() {
+fn a_trajectory_is_read_back_with_the_states_written() {
     for sample in samples() {
         let agents = sample.agents().remove(2);
         let imported = sample.genomes().remove(2);
@@ -205,7 +205,7 @@ fn a_trajectory_that_we_wrote_is_read_back_to_the_same_states() {
 }
 
 #[test]
-fn text_cut_anywhere_is_refused_with_a_line_or_read_as_a_shorter_run() {
+fn truncated_text_is_refused_with_a_line_or_read_as_a_shorter_run() {
     let [_, _, sample, _] = samples();
     let text = sample.text("agent_trajectory");
     let text: String = text.split_inclusive('\n').take(3 + 300).collect();

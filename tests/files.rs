@@ -1,4 +1,4 @@
-//! Files that commands write: on a full disk, under long names, and where there is no plain file.
+//! Files that commands write: on a full disk, with long names, and over special files.
 
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
@@ -11,7 +11,7 @@ use tests::disk::Disk;
 use tests::program::Evolver;
 use tests::tools;
 
-/// Longer than anything here takes.
+/// Longer than any operation here takes.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 const EVOLVE: [&str; 11] = [
@@ -28,7 +28,7 @@ const EVOLVE: [&str; 11] = [
     "7",
 ];
 
-/// With a run in `r`.
+/// A folder with a run in `r`.
 fn with_a_run() -> Evolver {
     let evolver = Evolver::in_empty_folder();
     evolve(&evolver, "r");
@@ -41,14 +41,14 @@ fn evolve(evolver: &Evolver, out: &str) {
 }
 
 #[test]
-fn on_a_full_disk_nothing_is_left_and_the_second_try_succeeds() {
+fn on_a_full_disk_nothing_is_left_behind_and_the_second_attempt_succeeds() {
     let evolver = with_a_run();
     let Some(disk) = tools::require(Disk::mounted_at(evolver.folder().join("disk"), "8k")) else {
         return;
     };
     let trajectory = "export r --format trajectory --out disk/file";
     let writers = [
-        // Its size is known before.
+        // Its size is known in advance.
         (trajectory, 2, "of disk would be needed"),
         (
             "gallery r --threads 1 --out disk/gallery",
@@ -73,9 +73,9 @@ fn on_a_full_disk_nothing_is_left_and_the_second_try_succeeds() {
 }
 
 #[test]
-fn a_run_that_a_disk_has_no_room_for_leaves_nothing() {
+fn a_run_that_does_not_fit_on_the_disk_leaves_nothing() {
     let evolver = with_a_run();
-    // Bytes enough, so that it is begun, but not for as many files.
+    // Enough bytes to start the run, but too few inodes for its files.
     let Some(disk) = tools::require(Disk::mounted_at(
         evolver.folder().join("disk"),
         "64m,nr_inodes=5",
@@ -102,7 +102,7 @@ fn a_run_that_a_disk_has_no_room_for_leaves_nothing() {
 }
 
 #[test]
-fn a_run_on_a_disk_that_gets_full_meanwhile_can_be_resumed() {
+fn a_run_during_which_the_disk_becomes_full_can_be_resumed() {
     let evolver = Evolver::in_empty_folder();
     let Some(_disk) = tools::require(Disk::mounted_at(evolver.folder().join("disk"), "8m")) else {
         return;
@@ -150,7 +150,7 @@ fn a_run_on_a_disk_that_gets_full_meanwhile_can_be_resumed() {
 }
 
 #[test]
-fn names_as_long_as_file_systems_take_are_written() {
+fn the_longest_names_that_file_systems_allow_are_written() {
     let evolver = with_a_run();
     for length in [236, 255] {
         let run = "r".repeat(length);
@@ -176,7 +176,7 @@ fn svg(evolver: &Evolver, file: &str) -> tests::program::Finished {
 }
 
 #[test]
-fn overwriting_keeps_a_link_a_pipe_and_a_device_what_they_are() {
+fn overwriting_a_link_a_pipe_or_a_device_does_not_replace_it() {
     let evolver = with_a_run();
     assert_eq!(svg(&evolver, "expected.svg").code, Some(0));
     let expected = evolver.read("expected.svg");
@@ -211,7 +211,7 @@ fn overwriting_keeps_a_link_a_pipe_and_a_device_what_they_are() {
 }
 
 #[test]
-fn overwriting_a_mounted_file_writes_to_it() {
+fn overwriting_a_mounted_file_writes_to_that_file() {
     let evolver = with_a_run();
     assert_eq!(svg(&evolver, "expected.svg").code, Some(0));
     for name in ["outside.svg", "mounted.svg"] {

@@ -1,5 +1,5 @@
-//! The behaviour of the program that the paper's authors published, recorded in
-//! `fixtures/golden` (or the folder named by `GOLDEN_DIR`), against ours.
+//! Compares ours with the behaviour of the program published by the paper's authors, recorded in
+//! `fixtures/golden` (or the folder named by `GOLDEN_DIR`).
 
 use minimal_surprise_controller::{Action, Controller, State};
 use minimal_surprise_sim::evaluation::run;
@@ -20,7 +20,7 @@ fn traced(recordings: &[Recording]) -> impl Iterator<Item = &Recording> {
 }
 
 #[test]
-fn the_world_driven_by_recorded_decisions_is_the_recorded_world() {
+fn the_world_driven_by_recorded_decisions_equals_the_recorded_world() {
     let recordings = recordings();
     let (mut steps, mut error_max) = (0, 0.0_f64);
     for recording in traced(&recordings) {
@@ -67,7 +67,7 @@ fn the_world_driven_by_recorded_decisions_is_the_recorded_world() {
 }
 
 #[test]
-fn the_controller_fed_recorded_sensors_decides_and_predicts_as_recorded() {
+fn the_controller_with_recorded_readings_decides_and_predicts_as_recorded() {
     let (mut bits, mut equal) = (0_u64, 0_u64);
     for recording in traced(&recordings()) {
         let controller = Controller::new(&recording.genome);
@@ -96,7 +96,7 @@ fn the_controller_fed_recorded_sensors_decides_and_predicts_as_recorded() {
 }
 
 #[test]
-fn running_free_for_500_steps_ends_with_the_recorded_fitness() {
+fn running_freely_for_500_steps_ends_with_the_recorded_fitness() {
     let mut close = 0;
     let recordings: Vec<Recording> = recordings()
         .into_iter()

@@ -1,5 +1,5 @@
-//! What a machine cannot hold is refused before anything is written, and estimates are near what is
-//! measured.
+//! Work that exceeds the machine's memory or disk is refused before anything is written, and
+//! estimates are close to measurements.
 #![cfg(unix)]
 
 use embedded_storage::nor_flash::NorFlash;
@@ -25,7 +25,7 @@ use tests::program::{Evolver, Finished};
 use tests::{genome, tools};
 use wait4::Wait4;
 
-/// A tiny evolution, in which one setting at a time is made large.
+/// A tiny evolution in which one setting at a time is made large.
 const TINY: [(&str, &str); 6] = [
     ("grid", "5x5"),
     ("robots", "2"),
@@ -34,11 +34,11 @@ const TINY: [(&str, &str); 6] = [
     ("repetitions", "1"),
     ("steps", "1"),
 ];
-/// Threads of the program; each has some memory of its own.
+/// Threads of the program; each uses some memory.
 const THREADS: u32 = 2;
-/// Longer than anything here takes.
+/// Longer than any operation here takes.
 const PATIENCE: Duration = Duration::from_secs(120);
-/// What the program takes for itself, in bytes.
+/// Memory used by the program itself, in bytes.
 const PROGRAM: f64 = 16e6;
 
 /// The command that runs it.
@@ -60,12 +60,12 @@ fn settings(of: &[(&'static str, &str)]) -> Settings {
     Settings::resolve(&given, || 1).unwrap()
 }
 
-/// Runs the program to its end; its peak of memory in bytes.
+/// Runs the program to its end; returns its peak memory use in bytes.
 fn peak(evolver: &Evolver, arguments: &[String]) -> f64 {
     let child = Command::new(evolver.program())
         .args(arguments)
         .current_dir(evolver.folder())
-        // Which works out no more answers than are asked for, and so is quick with many genomes.
+        // This path computes only the actions that are used, so it is fast with many genomes.
         .env("MINIMAL_SURPRISE_PATH", "portable")
         .stdin(Stdio::null())
         .stdout(Stdio::null())
@@ -80,7 +80,7 @@ fn words(line: &str) -> Vec<String> {
     line.split(' ').map(str::to_owned).collect()
 }
 
-/// Runs the program with less address space than the machine has.
+/// Runs the program with limited address space.
 fn within(evolver: &Evolver, kilobytes: u32, arguments: &[String]) -> Finished {
     let output = Command::new("sh")
         .args(["-c", &format!("ulimit -v {kilobytes}; exec \"$@\""), "sh"])
@@ -107,7 +107,7 @@ fn assert_near(what: &str, estimated: f64, measured: f64) {
 }
 
 #[test]
-fn the_memory_of_an_evolution_is_near_its_estimate_whatever_setting_is_large() {
+fn the_memory_of_an_evolution_is_close_to_its_estimate_for_every_large_setting() {
     for large in [
         [("population", "20000"), ("steps", "1")],
         [("repetitions", "100000"), ("robots", "25")],
@@ -125,7 +125,7 @@ fn the_memory_of_an_evolution_is_near_its_estimate_whatever_setting_is_large() {
 }
 
 #[test]
-fn the_memory_of_a_replay_and_of_new_starts_is_near_its_estimate() {
+fn the_memory_of_a_replay_and_of_new_starts_is_close_to_its_estimate() {
     let evolver = Evolver::in_empty_folder();
     let made = evolver.run(&evolve(&[("out", "run")]));
     assert_eq!(made.code, Some(0), "{made:?}");
@@ -166,7 +166,7 @@ fn memory_that_is_used_for_one_condition_after_the_other_is_counted_once() {
 }
 
 #[test]
-fn a_run_that_there_is_no_memory_for_is_not_damaged_and_is_resumed_where_there_is() {
+fn a_run_that_does_not_fit_into_memory_is_not_damaged_and_is_resumed_when_it_fits() {
     let evolver = Evolver::in_empty_folder();
     evolver.write("one.toml", ONE_LARGE.as_bytes());
     let suite = Suite::read(&evolver.folder().join("one.toml")).unwrap();
@@ -203,7 +203,7 @@ fn a_run_that_there_is_no_memory_for_is_not_damaged_and_is_resumed_where_there_i
             .eq(files.iter().filter(|file| !is_lock(file)))
     );
 
-    // Once the large one is done, the small one needs little; nor does a share without it.
+    // Once the large run is done, the rest needs little memory; so does a shard without it.
     evolver.write("both.toml", format!("{ONE_LARGE}{ONE_SMALL}").as_bytes());
     let small = "run-task --suite both.toml --shard 1/2 --out suite --threads 1";
     let small = within(&evolver, SHORT, &words(small));
@@ -219,7 +219,7 @@ fn a_run_that_there_is_no_memory_for_is_not_damaged_and_is_resumed_where_there_i
 }
 
 #[test]
-fn a_run_is_resumed_if_there_is_memory_for_the_threads_that_are_asked_for() {
+fn a_run_is_resumed_if_there_is_memory_for_the_requested_threads() {
     let evolver = Evolver::in_empty_folder();
     let settings = settings(&[
         ("grid", "300x300"),
@@ -259,7 +259,7 @@ fn the_text_of_a_trajectory_is_nearly_as_long_as_estimated() {
 }
 
 #[test]
-fn what_the_disk_has_no_room_for_is_refused_before_anything_is_written() {
+fn work_that_does_not_fit_on_the_disk_is_refused_before_anything_is_written() {
     let evolver = Evolver::in_empty_folder();
     let run = [("steps", "2000"), ("robots", "20"), ("out", "run")];
     assert_eq!(evolver.run(&evolve(&run)).code, Some(0));
@@ -352,7 +352,7 @@ fn the_files_of_a_run_have_nearly_the_estimated_sizes() {
     }
 }
 
-/// A suite of so many runs.
+/// A suite with the given number of runs.
 fn suite(evolver: &Evolver, runs: u32, robots: u32) {
     let robots: Vec<String> = (1..=robots).map(|n| n.to_string()).collect();
     let text = format!(
@@ -363,9 +363,9 @@ fn suite(evolver: &Evolver, runs: u32, robots: u32) {
     evolver.write("large.toml", text.as_bytes());
 }
 
-/// Kilobytes of address space that are too few for the large run of a suite.
+/// Kilobytes of address space, too few for the large run of a suite.
 const SHORT: u32 = 300_000;
-/// A suite of one run for which that is too little, but little is computed.
+/// A suite of one run for which that is too little, although little is computed.
 const ONE_LARGE: &str = "
     name = \"own\"
     [[experiment]]
@@ -392,7 +392,7 @@ const ONE_SMALL: &str = "
 ";
 
 #[test]
-fn what_this_machine_cannot_hold_is_refused_before_anything_is_written() {
+fn work_that_exceeds_this_machine_is_refused_before_anything_is_written() {
     let evolver = Evolver::in_empty_folder();
     let made = evolver.run(&evolve(&[("out", "run")]));
     assert_eq!(made.code, Some(0), "{made:?}");
@@ -461,7 +461,7 @@ fn what_this_machine_cannot_hold_is_refused_before_anything_is_written() {
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(refused.stderr.contains("steps = 1000000"), "{refused:?}");
     assert_eq!(evolver.files(), files, "{refused:?}");
-    // Not even the bits of one run could be counted; a replay has no population.
+    // Even the bits of one run exceed the counter; a replay has no population.
     let endless =
         "replay run/best.genome --grid 16384x16384 --robots 268435456 --steps 4294967295 --svg a";
     let refused = evolver.run(&words(endless));
@@ -494,7 +494,7 @@ fn what_this_machine_cannot_hold_is_refused_before_anything_is_written() {
 }
 
 #[test]
-fn a_million_runs_are_planned_counted_and_shared_out_in_a_hundred_megabytes() {
+fn a_million_runs_are_planned_counted_and_sharded_in_a_hundred_megabytes() {
     for (runs, combinations) in [(1_000_000, 1), (1000, 1000)] {
         let evolver = Evolver::in_empty_folder();
         suite(&evolver, runs, combinations);
@@ -523,7 +523,7 @@ fn a_million_runs_are_planned_counted_and_shared_out_in_a_hundred_megabytes() {
 }
 
 #[test]
-fn no_reader_takes_more_than_what_it_reads_can_be() {
+fn no_reader_uses_more_memory_than_its_largest_valid_input_needs() {
     let evolver = Evolver::in_empty_folder();
     let large = File::create(evolver.folder().join("large")).unwrap();
     large.set_len(1 << 30).unwrap();
@@ -574,7 +574,7 @@ fn no_reader_takes_more_than_what_it_reads_can_be() {
 }
 
 #[test]
-fn seeds_are_the_same_number_in_programs_that_compute_in_floating_point() {
+fn seeds_are_represented_exactly_in_programs_that_use_floating_point() {
     let evolver = Evolver::in_empty_folder();
     let json = |name: &str| -> Value { serde_json::from_slice(&evolver.read(name)).unwrap() };
     for run in ["a", "b", "c", "d"] {
@@ -609,7 +609,7 @@ fn seeds_are_the_same_number_in_programs_that_compute_in_floating_point() {
 }
 
 #[test]
-fn a_long_replay_says_what_it_computes() {
+fn a_long_replay_reports_what_it_computes() {
     let evolver = Evolver::in_empty_folder();
     let made = evolver.run(&evolve(&[("out", "run")]));
     assert_eq!(made.code, Some(0), "{made:?}");
@@ -623,12 +623,12 @@ fn a_long_replay_says_what_it_computes() {
 }
 
 #[test]
-fn a_robot_that_can_count_no_more_genomes_says_so_and_no_export_makes_one() {
+fn a_robot_whose_write_count_is_exhausted_says_so_and_no_export_creates_one() {
     let container = genome::random(1, Topology::default());
     let mut robot = LinkRobot::start(Flash::with_slot(&slot(&container, u32::MAX)));
     assert_eq!(robot.slots.write_count(), u32::MAX);
     assert_eq!(robot.begin(100, 0), Err(Refusal::CountExhausted));
-    // The way back: with both slots erased, it counts from 1 again.
+    // The remedy: with both slots erased, the robot counts from 1 again.
     let mut flash = robot.stop();
     let end = Flash::OFFSET + 2 * Slots::<Flash>::SLOT_BYTES as u32;
     flash.erase(Flash::OFFSET, end).unwrap();

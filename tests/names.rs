@@ -1,4 +1,4 @@
-//! Names, paths and files of users, through the whole program.
+//! Names, paths and files from users, through the whole program.
 
 use minimal_surprise_evolution::text;
 use pulldown_cmark::{Event, Options, Parser, Tag};
@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tests::program::{Evolver, Finished};
 
-/// Settings of a run that takes a moment.
+/// Settings of a short run.
 const SMALL: &str = "grid = \"8x8\"\nrobots = 20\npopulation = 4\ngenerations = 3\nrepetitions = 1\n\
                      steps = 20\nseed = 7\n";
 
-/// An experiment of one run that takes a moment.
+/// An experiment with one short run.
 fn experiment(name: &str) -> String {
     let name = serde_json::to_string(name).unwrap();
     format!(
@@ -40,7 +40,7 @@ fn assert_refused(run: &Finished, words: &[&str]) {
     }
 }
 
-/// What a shell does with a line that the program printed.
+/// Runs a line printed by the program in a shell.
 fn in_a_shell(evolver: &Evolver, line: &str) -> Output {
     let mut path = OsString::from(evolver.program().parent().unwrap());
     path.push(":");
@@ -143,7 +143,7 @@ fn a_suite_and_its_experiments_can_have_any_name() {
 }
 
 #[test]
-fn a_name_that_cannot_be_read_or_typed_is_refused_before_anything_is_written() {
+fn a_name_that_is_not_readable_or_typable_is_refused_before_anything_is_written() {
     let evolver = Evolver::in_empty_folder();
     for name in [
         "",
@@ -171,7 +171,7 @@ fn a_name_that_cannot_be_read_or_typed_is_refused_before_anything_is_written() {
 }
 
 #[test]
-fn a_suite_of_ones_own_called_paper_is_not_the_paper() {
+fn a_users_suite_named_paper_is_not_the_papers_suite() {
     let evolver = Evolver::in_empty_folder();
     evolver.write(
         "own.toml",
@@ -192,7 +192,7 @@ fn a_suite_of_ones_own_called_paper_is_not_the_paper() {
 }
 
 #[test]
-fn the_directory_that_an_earlier_version_named_after_a_suite_is_continued() {
+fn the_directory_named_by_an_earlier_version_after_a_suite_is_continued() {
     let evolver = Evolver::in_empty_folder();
     evolver.write("own.toml", suite("My Suite", &["one"]).as_bytes());
     fs::create_dir_all(evolver.folder().join("runs/My Suite")).unwrap();
@@ -281,13 +281,13 @@ fn two_exported_genomes_fit_into_one_firmware() {
     assert_refused(&raw, &["--name", "--format c"]);
 }
 
-/// A text as another program may save it.
+/// A text as a Windows program may save it.
 fn of_windows(text: &str) -> Vec<u8> {
     format!("\u{feff}{}", text.replace('\n', "\r\n")).into_bytes()
 }
 
 #[test]
-fn every_text_file_is_read_whatever_program_saved_it() {
+fn every_text_file_is_read_in_the_forms_that_programs_save() {
     let evolver = Evolver::in_empty_folder();
     evolver.write("small.toml", SMALL.as_bytes());
     done(evolver.run(&["evolve", "small.toml", "--out", "run"]));
@@ -383,7 +383,7 @@ fn every_text_file_is_read_whatever_program_saved_it() {
 }
 
 #[test]
-fn a_config_that_an_editor_gave_other_line_ends_is_resumed() {
+fn a_run_whose_config_got_other_line_ends_is_resumed() {
     let evolver = Evolver::in_empty_folder();
     evolver.write("small.toml", SMALL.replace("= 3", "= 200").as_bytes());
     let whole = [
@@ -406,7 +406,7 @@ fn a_config_that_an_editor_gave_other_line_ends_is_resumed() {
 }
 
 #[test]
-fn no_message_sends_a_terminal_what_a_path_or_a_name_holds() {
+fn no_message_sends_control_characters_of_paths_or_names_to_a_terminal() {
     let evolver = Evolver::in_empty_folder();
     let odd = "\u{1b}[31mred\u{202e}\u{200b}\u{9b}0m";
     fs::create_dir(evolver.folder().join(odd)).unwrap();
@@ -442,7 +442,7 @@ fn no_message_sends_a_terminal_what_a_path_or_a_name_holds() {
 }
 
 #[test]
-fn paths_that_are_not_utf_8_stay_paths() {
+fn paths_that_are_not_utf_8_are_kept() {
     let evolver = Evolver::in_empty_folder();
     let folder = evolver.folder();
     evolver.write("small.toml", SMALL.as_bytes());
@@ -478,7 +478,7 @@ fn paths_that_are_not_utf_8_stay_paths() {
         fs::canonicalize(folder).unwrap().join(bytes(b"r\xff"))
     );
 
-    // What it evolves from is in its settings, so that the same run can be made again.
+    // Its ancestor is in its settings, so that the same run can be repeated.
     let from = bytes(b"r\xff/best.genome");
     with("evolve small.toml --out s --from", from);
     done(evolver.run(&["evolve", "s/config.toml", "--out", "t"]));

@@ -1,5 +1,5 @@
-//! Commands for a robot on a serial port, against a robot, and against everything else that may be
-//! on a port.
+//! Commands for a robot on a serial port, tested with a robot and with other devices that may be on
+//! a port.
 #![cfg(target_os = "linux")]
 
 use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Surprise, Topology};
@@ -24,7 +24,7 @@ use tests::pty::{Answer, Device, Fault, PluggedRobot};
 /// Longest wait for a command's end.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// A folder with two genomes for this arithmetic and one for another.
+/// A folder with two genomes for this kernel and one for another kernel.
 fn with_genomes() -> Evolver {
     let evolver = Evolver::in_empty_folder();
     let topology = Topology::default();
@@ -47,7 +47,7 @@ fn flash(evolver: &Evolver, genome: &str, port: &str) -> Finished {
     evolver.run(&["flash", genome, "--port", port])
 }
 
-/// The CRC of the genome that the robot says it runs.
+/// The CRC of the genome that the robot reports as in use.
 fn crc_in_use(robot: &PluggedRobot) -> String {
     format!("{:?}", robot.robot().identify().genome)
 }
@@ -57,12 +57,12 @@ fn crc_of(container: &[u8]) -> String {
     format!("crc: {}", u32::from_le_bytes(*crc))
 }
 
-/// One message with all these words, and the exit code for bad input.
+/// Asserts one message with all these words, and the exit code for bad input.
 fn assert_refused(run: &Finished, words: &[&str]) {
     assert_error(run, 2, words);
 }
 
-/// One message with all these words, and the exit code for what broke.
+/// Asserts one message with all these words, and the exit code for failures.
 fn assert_failed(run: &Finished, words: &[&str]) {
     assert_error(run, 1, words);
 }
@@ -96,7 +96,7 @@ fn all_commands(port: &str) -> [Vec<&str>; 5] {
 }
 
 #[test]
-fn flash_writes_verifies_starts_and_says_what_runs() {
+fn flash_writes_verifies_starts_and_reports_what_runs() {
     let evolver = with_genomes();
     let robot = PluggedRobot::start(Flash::new(), Fault::None);
     let port = robot.device.port.clone();
@@ -162,7 +162,7 @@ fn monitor_shows_surprise_and_actions_second_by_second() {
 }
 
 #[test]
-fn monitor_ends_at_ctrl_c_which_is_early_only_before_its_time() {
+fn monitor_ends_at_ctrl_c_which_counts_as_early_only_before_the_given_time() {
     let evolver = with_genomes();
     let robot = with_the_old_genome(&evolver, Fault::None);
     for (time, code) in [(&[][..], 0), (&["--for", "600"], 130)] {
@@ -175,7 +175,7 @@ fn monitor_ends_at_ctrl_c_which_is_early_only_before_its_time() {
 }
 
 #[test]
-fn hil_ends_with_the_simulations_hash_and_leaves_the_robot_as_it_was() {
+fn hil_ends_with_the_hash_of_the_simulation_and_restores_the_robot() {
     let evolver = with_genomes();
     let robot = with_the_old_genome(&evolver, Fault::None);
     let port = robot.device.port.as_str();
@@ -214,7 +214,7 @@ fn hil_ends_with_the_simulations_hash_and_leaves_the_robot_as_it_was() {
 }
 
 #[test]
-fn hil_wants_the_same_genome_on_the_robot() {
+fn hil_requires_the_same_genome_on_the_robot() {
     let evolver = with_genomes();
     let robot = with_the_old_genome(&evolver, Fault::None);
     let port = robot.device.port.as_str();
@@ -227,7 +227,7 @@ fn hil_wants_the_same_genome_on_the_robot() {
 }
 
 #[test]
-fn bad_flags_name_the_flag_the_value_and_what_is_valid() {
+fn bad_flags_are_refused_with_the_flag_the_value_and_the_valid_range() {
     let evolver = with_genomes();
     let runs = [
         (
@@ -268,7 +268,7 @@ fn bad_flags_name_the_flag_the_value_and_what_is_valid() {
 }
 
 #[test]
-fn a_port_that_is_none_is_refused() {
+fn a_path_that_is_not_a_port_is_refused() {
     let evolver = with_genomes();
     for arguments in all_commands("/dev/nowhere") {
         let run = evolver.run(&arguments);
@@ -286,7 +286,7 @@ fn a_port_that_is_none_is_refused() {
 }
 
 #[test]
-fn a_port_whose_name_is_not_utf8_is_refused_with_the_way_round() {
+fn a_port_whose_name_is_not_utf8_is_refused_with_a_workaround() {
     let evolver = with_genomes();
     let robot = PluggedRobot::start(Flash::new(), Fault::None);
     let name = OsStr::from_bytes(b"robot\xff");
@@ -325,7 +325,7 @@ fn a_port_with_a_blank_or_a_line_end_is_shown_in_one_line_and_can_be_typed() {
 }
 
 #[test]
-fn a_port_that_says_nothing_is_refused() {
+fn a_silent_port_is_refused() {
     let evolver = with_genomes();
     let silent = Device::plug_in(|_| Answer::Bytes(Vec::new()));
     for arguments in all_commands(&silent.port) {
@@ -363,7 +363,7 @@ fn another_device_is_refused() {
 }
 
 #[test]
-fn a_device_that_never_stops_talking_is_refused() {
+fn a_device_that_never_stops_sending_is_refused() {
     let evolver = with_genomes();
     let compass = Device::talking(b"$HCHDG,101.1,,,7.1,W*3C\r\n");
     for arguments in all_commands(&compass.port) {
@@ -373,7 +373,7 @@ fn a_device_that_never_stops_talking_is_refused() {
 }
 
 #[test]
-fn a_genome_for_another_kernel_is_refused_before_the_robot_is_asked() {
+fn a_genome_for_another_kernel_is_refused_before_the_robot_is_contacted() {
     let evolver = with_genomes();
     let robot = with_the_old_genome(&evolver, Fault::None);
     let before = crc_in_use(&robot);
@@ -410,7 +410,7 @@ fn a_robot_of_another_kernel_is_refused_before_anything_is_stopped_or_erased() {
 }
 
 #[test]
-fn a_robot_that_can_count_no_more_genomes_says_what_to_do_and_is_left_as_it_was_found() {
+fn a_robot_whose_write_count_is_exhausted_says_what_to_do_and_is_restored() {
     let evolver = with_genomes();
     let old = evolver.read("old.genome");
     for running in [true, false] {
@@ -421,7 +421,7 @@ fn a_robot_that_can_count_no_more_genomes_says_what_to_do_and_is_left_as_it_was_
         let before = robot.robot().identify().genome;
         let run = flash(&evolver, "new.genome", &robot.device.port);
         let words = [
-            "has reached its end",
+            "has reached its maximum",
             "erase both of its genome slots with a debug probe",
             "it keeps the genome that it had",
         ];
@@ -434,10 +434,10 @@ fn a_robot_that_can_count_no_more_genomes_says_what_to_do_and_is_left_as_it_was_
 }
 
 #[test]
-fn a_refusal_half_way_leaves_the_robot_as_it_was_found() {
+fn after_a_refusal_halfway_the_robot_is_restored() {
     let evolver = with_genomes();
     let chunks = evolver.read("new.genome").len().div_ceil(128) as u64;
-    // 1 is stopping, 2 beginning or resetting; then come chunks and committing, or steps.
+    // Request 1 stops, request 2 begins or resets; then follow chunks and the commit, or steps.
     let refused = [
         (
             "flash",
@@ -488,15 +488,15 @@ fn a_refusal_half_way_leaves_the_robot_as_it_was_found() {
 }
 
 #[test]
-fn a_line_pulled_half_way_leaves_the_old_genome_in_use() {
+fn a_line_unplugged_halfway_leaves_the_old_genome_in_use() {
     let evolver = with_genomes();
-    // 1 is stopping, 2 beginning, the rest chunks; the last one is committing.
+    // Request 1 stops, request 2 begins, the others are chunks; the last one commits.
     for done in 1..=6 {
         for (fault, words) in [
             (Fault::PulledAfter(done), "the line broke"),
             (Fault::MuteAfter(done), "no answer any more"),
         ] {
-            // The longest time-out is that of erasing.
+            // The longest time-out is that of an erase.
             if fault == Fault::MuteAfter(2) && !full::all_cases() {
                 continue;
             }
@@ -518,7 +518,7 @@ fn a_line_pulled_half_way_leaves_the_old_genome_in_use() {
 }
 
 #[test]
-fn a_line_pulled_during_monitor_or_hil_is_told() {
+fn a_line_unplugged_during_monitor_or_hil_is_reported() {
     let evolver = with_genomes();
     let robot = with_the_old_genome(&evolver, Fault::PulledAfter(20));
     let run = evolver.run(&["hil", "old.genome", "--port", &robot.device.port]);
@@ -541,7 +541,7 @@ fn a_line_pulled_during_monitor_or_hil_is_told() {
 }
 
 #[test]
-fn a_commit_whose_answer_is_lost_is_found_out_about() {
+fn a_commit_whose_answer_is_lost_is_detected() {
     let evolver = with_genomes();
     let chunks = evolver.read("new.genome").len().div_ceil(128) as u64;
     let robot = with_the_old_genome(&evolver, Fault::MuteAfter(3 + chunks));
@@ -552,12 +552,12 @@ fn a_commit_whose_answer_is_lost_is_found_out_about() {
     assert!(crc_in_use(&robot).contains(&new));
 }
 
-/// The line that starts a robot on this port.
+/// The command that starts a robot on this port.
 fn start_line(port: &str) -> String {
     format!("the robot may be standing now; start it with: evolver start --port {port}")
 }
 
-/// Waits until the robot has done so much.
+/// Waits until the robot has carried out this many requests.
 fn wait_for(robot: &PluggedRobot, done: u64) {
     let started = Instant::now();
     while robot.robot().done < done {
@@ -567,7 +567,7 @@ fn wait_for(robot: &PluggedRobot, done: u64) {
 }
 
 #[test]
-fn start_and_stop_do_and_say_so() {
+fn start_and_stop_work_and_say_so() {
     let evolver = with_genomes();
     let robot = with_the_old_genome(&evolver, Fault::None);
     let port = robot.device.port.as_str();
@@ -585,13 +585,13 @@ fn start_and_stop_do_and_say_so() {
 }
 
 #[test]
-fn whoever_else_reads_the_port_every_command_ends() {
+fn every_command_ends_although_another_program_reads_the_port() {
     let evolver = with_genomes();
     let rounds = if full::all_cases() { 20 } else { 3 };
     let one = |kind: usize, bytes: usize| {
         let robot = with_the_old_genome(&evolver, Fault::None);
         let port = robot.device.port.clone();
-        // Takes all, or a few bytes now and then.
+        // Takes all bytes, or a few now and then.
         let read = match bytes {
             0 => "exec cat <$0".to_owned(),
             bytes => format!("while dd bs={bytes} count=1 <$0 2>&1; do :; done"),
@@ -608,7 +608,7 @@ fn whoever_else_reads_the_port_every_command_ends() {
         };
         let running = evolver.start(&arguments);
         if !full::all_cases() {
-            // Or beginning to write is repeated for 50 s.
+            // Otherwise the request to begin is repeated for 50 s.
             thread::sleep(Duration::from_secs(4));
             other.kill().unwrap();
         }
@@ -675,7 +675,7 @@ fn a_board_that_restarts_when_its_port_is_opened_is_waited_for() {
 }
 
 #[test]
-fn wait_is_for_the_first_answer_only() {
+fn wait_applies_only_to_the_first_answer() {
     let evolver = &with_genomes();
     thread::scope(|scope| {
         for wait in ["1", "60"] {
@@ -695,7 +695,7 @@ fn wait_is_for_the_first_answer_only() {
 }
 
 #[test]
-fn ctrl_c_during_flash_leaves_the_robot_as_it_was_found() {
+fn ctrl_c_during_flash_restores_the_robot() {
     let evolver = with_genomes();
     for (running, signal) in [(true, "INT"), (false, "TERM")] {
         let robot = with_the_old_genome(&evolver, Fault::SlowAfter(2));
@@ -720,7 +720,7 @@ fn ctrl_c_during_flash_leaves_the_robot_as_it_was_found() {
 }
 
 #[test]
-fn ctrl_c_during_hil_leaves_the_robot_as_it_was_found() {
+fn ctrl_c_during_hil_restores_the_robot() {
     let evolver = with_genomes();
     for (running, signal) in [(true, "INT"), (false, "INT"), (true, "TERM")] {
         let robot = with_the_old_genome(&evolver, Fault::SlowAfter(4));
@@ -745,16 +745,16 @@ fn ctrl_c_during_hil_leaves_the_robot_as_it_was_found() {
 }
 
 #[test]
-fn a_second_ctrl_c_ends_at_once_and_says_what_starts_the_robot() {
+fn a_second_ctrl_c_ends_at_once_and_says_how_to_start_the_robot() {
     let evolver = with_genomes();
-    // It begins, and its answer is waited for.
+    // The request to begin is sent, and its answer awaited.
     let robot = with_the_old_genome(&evolver, Fault::MuteAfter(3));
     robot.robot().start().unwrap();
     let port = robot.device.port.as_str();
     let flashing = evolver.start(&["flash", "new.genome", "--port", port]);
     wait_for(&robot, 3);
     flashing.signal("INT");
-    // The robot, an empty line, what the first one does.
+    // The robot, an empty line, and the effect of the first Ctrl-C.
     flashing.wait_for_lines(3);
     let run = flashing.interrupt(PATIENCE);
     assert_eq!(run.code, Some(130), "{run:?}");
@@ -762,7 +762,7 @@ fn a_second_ctrl_c_ends_at_once_and_says_what_starts_the_robot() {
 }
 
 #[test]
-fn a_lost_line_says_what_starts_a_robot_that_was_running() {
+fn a_lost_line_says_how_to_start_a_robot_that_was_running() {
     let evolver = with_genomes();
     for command in ["flash", "hil"] {
         for fault in [Fault::PulledAfter(3), Fault::MuteAfter(3)] {
@@ -779,7 +779,7 @@ fn a_lost_line_says_what_starts_a_robot_that_was_running() {
 }
 
 #[test]
-fn a_panic_leaves_the_robot_as_it_was_found() {
+fn a_panic_restores_the_robot() {
     static NEVER: AtomicBool = AtomicBool::new(false);
     let evolver = with_genomes();
     for running in [true, false] {
@@ -800,7 +800,7 @@ fn a_panic_leaves_the_robot_as_it_was_found() {
 }
 
 #[test]
-fn impossible_numbers_are_told_and_not_computed_with() {
+fn impossible_numbers_are_reported_and_not_used() {
     let evolver = with_genomes();
     let robot = with_the_old_genome(&evolver, Fault::None);
     let port = robot.device.port.as_str();

@@ -1,12 +1,12 @@
-//! The controller on an emulated Cortex-M4 against the controller here: the same bits; and how
-//! many instructions it takes there.
+//! The controller computes the same bits on an emulated Cortex-M4 as on the host, and stays within
+//! its instruction count there.
 
 use firmware_example::parity;
 use minimal_surprise_controller::KERNEL_ID;
 use tests::firmware::{self, Firmware};
 use tests::tools::{Missing, require};
 
-/// Most instructions that a layer of 14 activations may take.
+/// Maximum number of instructions for a layer of 14 activations.
 const ACTIVATIONS_BUDGET: u32 = 320;
 
 fn host_lines() -> Vec<String> {
@@ -22,7 +22,7 @@ fn expected_lines() -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// The built firmware and what one of its programs logged.
+/// The built firmware and the log of one of its programs.
 fn logged(program: &str) -> Option<(Firmware, Vec<String>)> {
     let both = firmware::build().and_then(|firmware| {
         let lines = firmware.run(program)?;
@@ -45,12 +45,12 @@ fn the_host_computes_the_expected_hashes() {
 }
 
 #[test]
-fn the_activations_hash_to_the_kernels_identity() {
+fn the_hash_of_the_activations_is_the_kernels_identity() {
     assert_eq!(parity::activations().0[..8], KERNEL_ID.0);
 }
 
 #[test]
-fn the_emulated_robot_computes_what_the_host_computes() {
+fn the_emulated_robot_computes_the_same_hashes_as_the_host() {
     let Some((firmware, lines)) = logged("parity") else {
         return;
     };
@@ -65,7 +65,7 @@ fn the_emulated_robot_computes_what_the_host_computes() {
 }
 
 #[test]
-fn fourteen_activations_stay_within_their_instructions() {
+fn fourteen_activations_stay_within_their_instruction_limit() {
     let Some((firmware, lines)) = logged("counts") else {
         return;
     };

@@ -1,4 +1,4 @@
-//! Scans of a range-and-bearing module: what is not one changes nothing.
+//! Scans of a range-and-bearing module: invalid frames change nothing.
 
 use firmware_example::range_bearing::RangeBearing;
 use firmware_example::robot::NEIGHBOURS_MAX;
@@ -7,14 +7,14 @@ use minimal_surprise_link::{WIRE_BYTES_MAX, encode};
 use proptest::prelude::*;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-/// A frame whose message is these bytes, as they are.
+/// A frame with exactly these bytes as its message.
 fn frame(message: &[u8]) -> Vec<u8> {
     let mut wire = [0; WIRE_BYTES_MAX];
     let length = encode(&Raw(message), &mut wire).unwrap();
     wire[..length].to_vec()
 }
 
-/// Bytes that are written without their number.
+/// Bytes serialised without their length.
 struct Raw<'a>(&'a [u8]);
 
 impl serde::Serialize for Raw<'_> {
@@ -37,7 +37,7 @@ fn message(found: &[(u16, i16)]) -> Vec<u8> {
     message
 }
 
-/// How many scans the bytes complete, and what is known after them.
+/// How many scans the bytes complete, and the neighbours after them.
 fn feed(bytes: &[u8]) -> (usize, Vec<Detection>) {
     let mut module = RangeBearing::new();
     let mut neighbours = Neighbours::<NEIGHBOURS_MAX>::new();
@@ -49,7 +49,7 @@ fn feed(bytes: &[u8]) -> (usize, Vec<Detection>) {
 }
 
 #[test]
-fn a_scan_is_read_as_documented_to_the_byte() {
+fn a_scan_is_read_byte_for_byte_as_documented() {
     // Two neighbours: 258 mm to the left, 100 mm behind on the right. CRC-32C, low byte first.
     let bytes = [2, 2, 1, 0, 0x40, 100, 0, 0, 0xa0];
     let expected = [(258.0, FRAC_PI_2), (100.0, -3.0 * FRAC_PI_4)];
@@ -78,7 +78,7 @@ fn a_scan_without_neighbours_is_a_scan() {
 }
 
 #[test]
-fn of_several_scans_the_newest_counts() {
+fn the_newest_of_several_scans_counts() {
     let scans = [[(100, 0), (200, 0)], [(300, 0), (400, 0)]];
     let bytes: Vec<u8> = scans
         .iter()
@@ -90,7 +90,7 @@ fn of_several_scans_the_newest_counts() {
 }
 
 #[test]
-fn a_count_that_is_not_that_of_the_neighbours_is_no_scan() {
+fn a_frame_whose_count_does_not_match_its_neighbours_is_not_a_scan() {
     for count in [0, 1, 3, 255] {
         let mut message = message(&[(1, 1), (2, 2)]);
         message[0] = count;
@@ -112,7 +112,7 @@ proptest! {
         let bit = bit.index(8 * bytes.len());
         bytes[bit / 8] ^= 1 << (bit % 8);
         let (scans, detections) = feed(&bytes);
-        // A zero before the frame is only there to end what came before it.
+        // A zero before the frame only ends the bytes before it.
         prop_assert!(scans == 0 && detections.is_empty() || scans == 1 && bit < 8);
     }
 

@@ -1,6 +1,6 @@
 //! Pictures of a run: `evolver replay` into SVG, PNG, GIF and MP4.
 //!
-//! `UPDATE_SNAPSHOTS=1` writes the files in `snapshots/` anew; look at them before they are kept.
+//! `UPDATE_SNAPSHOTS=1` writes the files in `snapshots/` anew; check them before committing.
 
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
 use minimal_surprise_controller::{EncodedGenome, Provenance};
@@ -72,7 +72,7 @@ fn png_pixels(bytes: &[u8]) -> (Pixels, Option<u32>) {
     (pixels, per_metre)
 }
 
-/// Every frame of a GIF as it is seen, and for how many hundredths of a second.
+/// Every frame of a GIF as displayed, and its duration in hundredths of a second.
 fn gif_frames(bytes: &[u8]) -> Vec<(Pixels, u16)> {
     let mut reader = gif::DecodeOptions::new().read_info(bytes).expect("a GIF");
     let width = usize::from(reader.width());
@@ -130,7 +130,7 @@ fn assert_as_kept(evolver: &Evolver, name: &str) {
 }
 
 #[test]
-fn stills_are_drawn_as_they_were() {
+fn stills_match_their_snapshots() {
     let evolver = with_a_run();
     let stills = [
         ("final-state", ""),
@@ -149,14 +149,14 @@ fn stills_are_drawn_as_they_were() {
 }
 
 #[test]
-fn a_still_has_the_width_of_a_column_and_words_of_seven_points() {
+fn a_still_has_the_width_of_a_column_and_text_of_seven_points() {
     let evolver = with_a_run();
     replay(&evolver, "run --svg a.svg --png a.png");
     let svg = evolver.text("a.svg");
     assert!(svg.contains("width=\"85mm\""), "{svg:.200}");
     assert!(!svg.contains("<text"), "words are outlines");
     let (pixels, per_metre) = png_pixels(&evolver.read("a.png"));
-    // 85 mm of 300 dots an inch.
+    // 85 mm at 300 dots per inch.
     assert_eq!((pixels.width, per_metre), (1004, Some(11811)));
     replay(
         &evolver,
@@ -201,7 +201,7 @@ const CELL: [u8; 3] = [0xf4, 0xf4, 0xf2];
 const LINE: [u8; 3] = [0xdc, 0xdc, 0xd8];
 const ROBOT: [u8; 3] = [0x2b, 0x2b, 0x29];
 
-/// What is seen of poses on a grid with cells of so many pixels, robots plain.
+/// The poses visible on a grid with cells of the given size in pixels, robots drawn plain.
 fn poses_seen(frame: &Pixels, cells: (usize, usize), side: usize) -> Vec<Pose> {
     // The grid begins with a line.
     let corner = frame.rgb.iter().position(|&colour| colour == LINE);
@@ -216,7 +216,7 @@ fn poses_seen(frame: &Pixels, cells: (usize, usize), side: usize) -> Vec<Pose> {
                     north + (cells.1 - 1 - y) * side + down * side / 4,
                 )
             };
-            // East, north, west, south; behind a robot its outline is notched.
+            // East, north, west, south; the outline of a robot is notched at its back.
             let around = [(3, 2), (2, 1), (1, 2), (2, 3)].map(|(x, y)| quarter(x, y));
             if quarter(2, 2) == ROBOT {
                 let ahead: Vec<usize> = (0..4)
@@ -254,7 +254,7 @@ fn every_frame_of_a_gif_shows_the_poses_of_its_state() {
     let exported = evolver.run(&words("export run --format trajectory --out trajectory"));
     assert_eq!(exported.code, Some(0), "{exported:?}");
     let trajectory = Trajectory::read(&evolver.text("trajectory")).expect("a trajectory");
-    // Of the run and of its trajectory the same is seen.
+    // The run and its trajectory show the same.
     for from in ["run", "trajectory"] {
         replay(
             &evolver,
@@ -275,7 +275,7 @@ fn every_frame_of_a_gif_shows_the_poses_of_its_state() {
 }
 
 #[test]
-fn the_readme_opens_with_what_its_first_commands_draw() {
+fn the_readme_opens_with_the_picture_that_its_first_commands_draw() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let readme = fs::read_to_string(root.join("README.md")).expect("there is one");
     let picture = readme.split_once("](docs/").expect("a picture").1;
@@ -299,7 +299,7 @@ fn the_readme_opens_with_what_its_first_commands_draw() {
 }
 
 #[test]
-fn an_animation_has_about_a_hundred_frames_unless_said_otherwise() {
+fn an_animation_has_about_a_hundred_frames_by_default() {
     let evolver = Evolver::in_empty_folder();
     let short = "evolve --population 4 --generations 1 --repetitions 1 --steps 350 --robots 9 \
                  --grid 6x6 --out run";
@@ -312,7 +312,7 @@ fn an_animation_has_about_a_hundred_frames_unless_said_otherwise() {
 }
 
 #[test]
-fn a_replay_is_the_same_whenever_it_is_drawn() {
+fn a_replay_is_drawn_the_same_every_time() {
     let evolver = with_a_run();
     for copy in ["a", "b"] {
         replay(
@@ -326,7 +326,7 @@ fn a_replay_is_the_same_whenever_it_is_drawn() {
     }
 }
 
-/// A program of this name that does this, in a folder of its own.
+/// A program that runs this script, in a separate folder.
 #[cfg(unix)]
 fn stand_in(evolver: &Evolver, script: &str) -> String {
     use std::os::unix::fs::PermissionsExt;
@@ -342,7 +342,7 @@ fn stand_in(evolver: &Evolver, script: &str) -> String {
 #[test]
 fn ffmpeg_gets_the_frames_of_the_gif() {
     let evolver = with_a_run();
-    // Its last argument is the file; only the shell's own and what /bin has is needed.
+    // Its last argument is the file; only shell builtins and programs in /bin are needed.
     let keeps = "#!/bin/sh\nfor file; do :; done\n/bin/cat > \"$file\"\n";
     let path = stand_in(&evolver, keeps);
     let flags = "replay run --gif a.gif --mp4 a.mp4 --every 20 --fps 7";
@@ -361,7 +361,7 @@ fn ffmpeg_gets_the_frames_of_the_gif() {
 
 #[cfg(unix)]
 #[test]
-fn without_ffmpeg_there_is_no_mp4_but_a_word_on_what_to_install() {
+fn without_ffmpeg_there_is_no_mp4_and_a_message_says_what_to_install() {
     let evolver = with_a_run();
     let flags = words("replay run --mp4 a.mp4");
     let run = evolver.run_with(("PATH", "/nowhere"), &flags);
@@ -369,7 +369,7 @@ fn without_ffmpeg_there_is_no_mp4_but_a_word_on_what_to_install() {
         &run,
         &["--mp4 = a.mp4", "ffmpeg", "apt-get install", "--gif"],
     );
-    // Nor is anything else written.
+    // Nothing else is written either.
     let both = words("replay run --gif a.gif --svg a.svg --mp4 a.mp4");
     let run = evolver.run_with(("PATH", "/nowhere"), &both);
     assert_refused(&run, &["--mp4 = a.mp4", "ffmpeg"]);
@@ -401,7 +401,7 @@ fn nothing_is_overwritten() {
 }
 
 #[test]
-fn what_a_run_does_not_have_is_refused() {
+fn requests_for_what_a_run_does_not_have_are_refused() {
     let evolver = with_a_run();
     let exported = evolver.run(&words("export run --format trajectory --out trajectory"));
     assert_eq!(exported.code, Some(0), "{exported:?}");
@@ -465,7 +465,7 @@ fn what_a_run_does_not_have_is_refused() {
 }
 
 #[test]
-fn a_run_directory_that_is_not_whole_is_refused() {
+fn an_incomplete_run_directory_is_refused() {
     let evolver = with_a_run();
     let refused = |file: &str, change: &dyn Fn(&str) -> Option<String>, words_of_it: &[&str]| {
         let path = evolver.folder().join("run").join(file);
@@ -475,7 +475,7 @@ fn a_run_directory_that_is_not_whole_is_refused() {
             None => fs::remove_file(&path).unwrap(),
         }
         let run = evolver.run(&words("replay run --svg a.svg"));
-        // Without it the run is not complete; whatever else it lacks is damage.
+        // Without it the run is incomplete; any other missing file is damage.
         let code = if file == "DONE" { 2 } else { 1 };
         assert_ended(&run, code, words_of_it);
         fs::write(&path, good).unwrap();
@@ -505,7 +505,7 @@ fn a_run_directory_that_is_not_whole_is_refused() {
 }
 
 #[test]
-fn numbers_that_cannot_be_are_refused_in_every_file_of_a_run() {
+fn impossible_numbers_are_refused_in_every_file_of_a_run() {
     let evolver = with_a_run();
     let hash = evolver.text("run/DONE");
     let first_fitness = |value: &str| {
@@ -613,7 +613,7 @@ fn numbers_that_cannot_be_are_refused_in_every_file_of_a_run() {
 }
 
 #[test]
-fn what_cannot_be_read_is_not_said_to_be_missing() {
+fn unreadable_files_are_not_reported_as_missing() {
     let evolver = with_a_run();
     let run = evolver.folder().join("run");
     let refused = |code: i32, arguments: &str, problem: &str| {
@@ -677,7 +677,7 @@ fn what_cannot_be_read_is_not_said_to_be_missing() {
 }
 
 #[test]
-fn genomes_are_taken_from_run_directories_and_nothing_is_exported_over_a_file() {
+fn genomes_are_read_from_run_directories_and_export_overwrites_no_file() {
     let evolver = with_a_run();
     for line in ["inspect", "export --format c", "export --format hex"] {
         let of = |from: &str| evolver.run(&[words(line), vec![from]].concat());
@@ -694,13 +694,13 @@ fn genomes_are_taken_from_run_directories_and_nothing_is_exported_over_a_file() 
 }
 
 #[test]
-fn a_damaged_swarm_is_named_after_what_it_was_before() {
+fn a_damaged_swarm_is_named_after_its_structure_before_the_damage() {
     let evolver = with_a_run();
     let classified = evolver.run(&words("classify run --json"));
     let classified: serde_json::Value =
         serde_json::from_str(&classified.stdout).expect("it is JSON");
     let name = classified["names"][0].as_str().expect("it has a name");
-    // Of a swarm of which most is taken away, little is left to be named after.
+    // If most of a swarm is removed, the rest is too small to name it after.
     replay(&evolver, "run --remove 0,0,14,11 --svg a.svg --html a.html");
     assert!(
         evolver
@@ -715,7 +715,7 @@ fn a_damaged_swarm_is_named_after_what_it_was_before() {
 }
 
 #[test]
-fn a_run_with_the_genome_or_the_state_of_another_is_refused_by_all_who_replay_it() {
+fn a_run_with_the_genome_or_the_state_of_another_run_is_refused_by_every_replay() {
     let evolver = with_a_run();
     let other = "evolve --population 6 --generations 3 --repetitions 2 --steps 60 --robots 60 \
                  --seed 5 --out other";
@@ -765,7 +765,7 @@ fn a_run_with_the_genome_or_the_state_of_another_is_refused_by_all_who_replay_it
 }
 
 #[test]
-fn a_noisy_run_of_the_first_version_is_checked_by_the_bits_that_it_hashed() {
+fn a_noisy_run_of_the_first_version_is_checked_with_the_bits_that_it_hashed() {
     let evolver = Evolver::in_empty_folder();
     copy_noisy_run(&evolver.folder().join("run"));
     let lines = [
@@ -777,7 +777,7 @@ fn a_noisy_run_of_the_first_version_is_checked_by_the_bits_that_it_hashed() {
         let run = evolver.run(&words(line));
         assert_eq!(run.code, Some(0), "{line}: {run:?}");
     }
-    // The same hash as one of version 2 is another run's.
+    // The same hash, declared as version 2, belongs to a different run.
     let state = evolver.text("run/final.json");
     let state = state.replace("\"steps_hash\"", "\"steps_hash_v2\"");
     evolver.write("run/final.json", state.as_bytes());
@@ -786,7 +786,7 @@ fn a_noisy_run_of_the_first_version_is_checked_by_the_bits_that_it_hashed() {
 }
 
 #[test]
-fn a_damaged_run_or_folder_keeps_no_other_run_out_of_a_gallery() {
+fn a_damaged_run_or_folder_does_not_exclude_others_from_a_gallery() {
     let evolver = with_a_run();
     let whole = evolver.read("run/final.json");
     for copy in ["cut", "loop", "good"] {
@@ -815,7 +815,7 @@ fn a_damaged_run_or_folder_keeps_no_other_run_out_of_a_gallery() {
 }
 
 #[test]
-fn a_trajectory_of_one_state_is_nothing_to_replay() {
+fn a_trajectory_with_one_state_cannot_be_replayed() {
     let evolver = with_a_run();
     let exported = evolver.run(&words("export run --format trajectory --out trajectory"));
     assert_eq!(exported.code, Some(0), "{exported:?}");

@@ -9,7 +9,7 @@ use serde_json::Value;
 use tests::program::{Evolver, Finished, Profile};
 use tests::terminal::{Terminal, close_terminal_of};
 
-/// The window that terminals open with.
+/// The default size of a terminal window.
 const WINDOW: (u16, u16) = (24, 80);
 
 /// Rows above the swarm.
@@ -43,7 +43,7 @@ fn evolve(out: &str) -> impl Iterator<Item = &str> {
     flags.split(' ').chain([out])
 }
 
-/// All states of the run, by way of the file for other programs.
+/// All states of the run, read from its exported trajectory.
 fn states(evolver: &Evolver) -> Trajectory {
     let exported = evolver.run(&["export", "run", "--format", "trajectory"]);
     assert_eq!(exported.code, Some(0), "{exported:?}");
@@ -64,14 +64,14 @@ fn assert_refused(run: &Finished, words: &[&str]) {
     assert_eq!(run.stdout, "", "{run:?}");
 }
 
-/// What stands in a cell on the screen: what is marked on its left, and what is in it.
+/// The contents of a cell on the screen: the mark to its left, and the character in it.
 fn cell(terminal: &Terminal, grid: Grid, x: u16, y: u16) -> (String, String) {
     let row = TITLE as u16 + grid.height() - 1 - y;
     let at = |column| terminal.screen().cell(row, column).unwrap().contents();
     (at(2 * x).to_owned(), at(2 * x + 1).to_owned())
 }
 
-/// The swarm on the screen, drawn with filled arrows.
+/// The swarm on the screen, with filled arrows.
 fn swarm(terminal: &Terminal, grid: Grid) -> String {
     let arrows = [("▷▸", "▶"), ("△▴", "▲"), ("◁◂", "◀"), ("▽▾", "▼")];
     let rows = (0..grid.height()).rev().map(|y| {
@@ -87,7 +87,7 @@ fn swarm(terminal: &Terminal, grid: Grid) -> String {
     rows.collect::<Vec<_>>().join("\n")
 }
 
-/// The step that the screen says.
+/// The step shown on the screen.
 fn step(terminal: &Terminal) -> usize {
     let rows = terminal.rows();
     let line = rows.iter().find(|row| row.contains(" of 60 ")).unwrap();
@@ -97,7 +97,7 @@ fn step(terminal: &Terminal) -> usize {
 }
 
 #[test]
-fn every_key_that_moves_in_time_shows_the_state_that_it_says() {
+fn every_key_that_moves_in_time_shows_the_state_of_the_displayed_step() {
     let evolver = with_a_run();
     let trajectory = states(&evolver);
     let grid = trajectory.grid();
@@ -169,7 +169,7 @@ fn playing_moves_the_robots_and_ends_at_the_last_state() {
 }
 
 #[test]
-fn a_picked_robot_shows_what_it_senses_and_what_it_had_predicted() {
+fn a_selected_robot_shows_what_it_senses_and_what_it_had_predicted() {
     let evolver = with_a_run();
     let starts = final_json(&evolver, "start");
     let grid = states(&evolver).grid();
@@ -210,7 +210,7 @@ fn a_picked_robot_shows_what_it_senses_and_what_it_had_predicted() {
     terminal.after("p", "robot 1 at");
     terminal.after(END, "expects");
     assert!(terminal.screen().contents().contains('○'));
-    // Followed by another key at once, it would be part of that key.
+    // If another key followed at once, Escape would be read as part of that key.
     terminal.types(ESCAPE);
     terminal.wait_while("robot 1 at");
     terminal.after(HOME, "step  0 of 60");
@@ -236,7 +236,7 @@ fn a_window_smaller_than_the_grid_says_which_part_it_shows_and_scrolls() {
     terminal.after("n", "cropped");
     terminal.after(RIGHT, "step  1 of 60");
     terminal.after(LEFT, "step  0 of 60");
-    // The robot's arrow is the one in reverse.
+    // The arrow in reverse video is the robot.
     let inverse = |terminal: &Terminal| {
         let mut cells = (0..60).flat_map(|x| (0..12).map(move |y| (y, x)));
         cells.any(|(y, x)| {
@@ -258,7 +258,7 @@ fn a_window_smaller_than_the_grid_says_which_part_it_shows_and_scrolls() {
 }
 
 #[test]
-fn without_colours_the_screen_says_the_same() {
+fn without_colours_the_screen_shows_the_same() {
     let evolver = with_a_run();
     let screen = |variables: &[(&str, &str)]| {
         let mut terminal = Terminal::start(&evolver, WINDOW, variables, &["replay", "run"]);
@@ -285,7 +285,7 @@ fn without_colours_the_screen_says_the_same() {
 }
 
 #[test]
-fn damage_is_shown_where_it_was_and_the_swarm_as_it_was_before() {
+fn damage_is_shown_where_it_occurred_with_the_swarm_before_it() {
     let evolver = with_a_run();
     let grid = states(&evolver).grid();
     let before = final_json(&evolver, "final");
@@ -342,7 +342,7 @@ fn ctrl_c_and_signals_end_it_and_restore_the_terminal() {
 }
 
 #[test]
-fn evolve_opens_the_replay_of_its_run_and_leaves_its_summary() {
+fn evolve_opens_the_replay_of_its_run_and_prints_its_summary() {
     let evolver = Evolver::built(Profile::Debug);
     let arguments: Vec<&str> = evolve("run").chain(["--open"]).collect();
     let mut terminal = Terminal::start(&evolver, (60, 100), &[], &arguments);
@@ -355,7 +355,7 @@ fn evolve_opens_the_replay_of_its_run_and_leaves_its_summary() {
     let summary = terminal.screen().contents();
     assert!(summary.contains("evolver replay run"), "{summary}");
 
-    // A run that is complete opens at once.
+    // A complete run opens immediately.
     let again = ["evolve", "--resume", "run", "--open"];
     let mut terminal = Terminal::start(&evolver, (60, 100), &[], &again);
     terminal.wait_for("q quit");
@@ -374,7 +374,8 @@ fn without_a_terminal_nothing_is_evolved_or_played() {
     assert_eq!(evolver.files(), before);
 }
 
-/// Runs it to its end in a terminal with these variables; gives the exit code and what it sent.
+/// Runs the program to its end in a terminal with these variables; returns its exit code and
+/// output.
 fn ended_in(
     evolver: &Evolver,
     window: (u16, u16),
@@ -458,7 +459,7 @@ fn a_terminal_without_utf8_gets_ascii_and_a_pipe_gets_utf8() {
 }
 
 #[test]
-fn no_window_is_too_small_for_any_command() {
+fn every_command_works_in_windows_of_any_size() {
     let evolver = with_a_run();
     for (rows, columns) in [(1, 1), (24, 1), (1, 20), (6, 7), (24, 20), (24, 39)] {
         let out = format!("run-{rows}-{columns}");
@@ -473,14 +474,14 @@ fn no_window_is_too_small_for_any_command() {
         assert_eq!(terminal.ended(), 0, "{rows}x{columns}");
         assert!(terminal.is_restored(), "{rows}x{columns}");
     }
-    // A bar that is gone leaves nothing behind, also where it was cut.
+    // A progress bar leaves nothing behind, even if it was truncated.
     let arguments: Vec<&str> = evolve("narrow").collect();
     let mut terminal = Terminal::start(&evolver, (40, 20), &[], &arguments);
     assert_eq!(terminal.ended(), 0);
     let rows = terminal.rows().join("\n");
     assert!(!rows.contains("/2  best"), "{rows}");
     assert!(rows.contains("(a 15x15 grid is too"), "{rows}");
-    // Only the picture is left out.
+    // Only the drawing is left out.
     let piped = evolver.run(&evolve("piped").collect::<Vec<_>>()).stdout;
     let piped = piped.replace("piped", "narrow");
     assert_tells_all(&terminal.sent(), &piped, &["fitness", "hash"]);
@@ -490,7 +491,7 @@ fn no_window_is_too_small_for_any_command() {
     assert_tells_all(&sent, &piped, &["fitness", "clustering"]);
 }
 
-/// All lines of text that come through a pipe, among them some with these words.
+/// Asserts that a terminal shows all lines that go through a pipe, including these words.
 fn assert_tells_all(sent: &str, piped: &str, words: &[&str]) {
     for word in words {
         assert!(piped.contains(word), "no {word:?} in {piped}");
@@ -533,7 +534,7 @@ fn a_run_under_nohup_outlives_its_terminal_and_another_can_be_resumed() {
 }
 
 #[test]
-fn a_trajectory_is_played_without_minds() {
+fn a_trajectory_is_played_without_predictions() {
     let evolver = with_a_run();
     let grid = states(&evolver).grid();
     let flags = "export run --format trajectory --out agent_trajectory";
@@ -549,7 +550,7 @@ fn a_trajectory_is_played_without_minds() {
 }
 
 #[test]
-fn what_cannot_be_replayed_is_refused_with_one_message() {
+fn input_that_cannot_be_replayed_is_refused_with_one_message() {
     let evolver = with_a_run();
     let exported = evolver
         .run(&["export", "run", "--format", "trajectory"])

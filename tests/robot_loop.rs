@@ -1,4 +1,4 @@
-//! The robot's control loop on a board that only remembers: it is safe by itself.
+//! The robot's control loop on a mock board: it is safe by itself.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use firmware_example::memory_flash::MemoryFlash;
@@ -12,7 +12,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// What the robot has done to its board and its flash, in order.
+/// What the robot does to its board and its flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Event {
     Drive(Motion),
@@ -25,7 +25,7 @@ type Events = Rc<RefCell<Vec<Event>>>;
 
 #[derive(Debug, Default)]
 struct TestBoard {
-    /// What the next period's detector delivers: nothing, or whether there is a robot ahead.
+    /// What the detector delivers in the next period: nothing, or whether there is a robot ahead.
     reading: Option<bool>,
     arriving: VecDeque<u8>,
     period: bool,
@@ -36,7 +36,7 @@ struct TestBoard {
 }
 
 impl TestBoard {
-    /// What has happened since the last call.
+    /// Events since the last call.
     fn events(&mut self) -> Vec<Event> {
         self.events.take()
     }
@@ -86,7 +86,7 @@ impl Board for TestBoard {
     fn log(&mut self, _: &Report) {}
 }
 
-/// Flash that remembers when it was touched.
+/// Flash that records its erases and writes.
 #[derive(Debug, Default)]
 struct TestFlash {
     memory: MemoryFlash,
@@ -132,8 +132,8 @@ fn start(memory: MemoryFlash) -> TestRobot {
     Robot::start(board, TestFlash { memory, events }, 0).unwrap()
 }
 
-/// The container of a genome that always goes straight: all action weights pull the output below
-/// zero.
+/// The container of a genome that always goes straight: all action weights make the output
+/// negative.
 fn straight() -> Vec<u8> {
     let topology = Topology::default();
     let shape = topology.action_shape();
@@ -203,7 +203,7 @@ fn a_robot_stands_until_it_is_started_and_after_it_is_stopped() {
 }
 
 #[test]
-fn a_robot_never_drives_into_an_occupied_cell_or_one_it_knows_nothing_about() {
+fn a_robot_never_drives_into_an_occupied_or_unknown_cell() {
     let mut robot = robot_that_goes_straight();
     ask(&mut robot, 1, &[Request::Start]);
     assert_eq!(period(&mut robot, Some(false)), Some(Motion::Ahead));
@@ -216,7 +216,7 @@ fn a_robot_never_drives_into_an_occupied_cell_or_one_it_knows_nothing_about() {
 }
 
 #[test]
-fn a_robot_that_turns_stands_too_once_its_data_are_older_than_two_periods() {
+fn a_turning_robot_also_stands_once_its_data_are_older_than_two_periods() {
     let mut robot = robot_that_turns();
     ask(&mut robot, 1, &[Request::Start]);
     for _ in 0..3 {
@@ -231,7 +231,7 @@ fn a_robot_that_turns_stands_too_once_its_data_are_older_than_two_periods() {
 }
 
 #[test]
-fn the_motors_are_stopped_before_flash_is_erased_and_stand_while_it_is_written() {
+fn the_motors_are_stopped_before_an_erase_and_stay_stopped_during_writes() {
     let container = straight();
     let begin = Request::Begin {
         length: container.len().try_into().unwrap(),
@@ -248,7 +248,7 @@ fn the_motors_are_stopped_before_flash_is_erased_and_stand_while_it_is_written()
     ask(&mut robot, 1, &[Request::Start]);
     assert_eq!(period(&mut robot, Some(false)), Some(Motion::Right));
     robot.board().events();
-    // Refused, as the robot runs.
+    // Refused because the robot is running.
     ask(&mut robot, 2, &requests);
     assert_eq!(robot.board().events(), []);
 
@@ -263,7 +263,7 @@ fn the_motors_are_stopped_before_flash_is_erased_and_stand_while_it_is_written()
         written.iter().all(|event| *event == Event::Write),
         "{written:?}"
     );
-    // It was the update of a genome that goes straight.
+    // The update brought a genome that goes straight.
     ask(&mut robot, 5, &[Request::Start]);
     assert_eq!(period(&mut robot, Some(false)), Some(Motion::Ahead));
 }
@@ -284,7 +284,7 @@ fn the_watchdog_is_fed_at_the_end_of_a_period_and_not_in_between() {
 }
 
 #[test]
-fn talking_does_not_feed_the_watchdog() {
+fn communication_does_not_feed_the_watchdog() {
     let mut robot = robot_that_goes_straight();
     robot.board().events();
     for session in 1..20 {
@@ -294,7 +294,7 @@ fn talking_does_not_feed_the_watchdog() {
     assert_eq!(robot.board().events(), []);
 }
 
-/// The faults that the robot names itself with, and those in its telemetry.
+/// The faults in the robot's identity, and those in its telemetry.
 fn faults(robot: &mut TestRobot) -> [Faults; 2] {
     let mut client = Client::new(1, 1);
     [Request::Identify, Request::Telemetry].map(|request| {

@@ -1,6 +1,6 @@
-//! Suites on a real Slurm of three nodes, which die, terminate tasks and start them again.
+//! Suites on a real Slurm with three nodes, which die, terminate tasks and restart them.
 //!
-//! Only with `TEST_ALL=1`, as root, and where Slurm is installed.
+//! Runs only with `TEST_ALL=1`, as root, and if Slurm is installed.
 #![cfg(target_os = "linux")]
 
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ use tests::full;
 use tests::program::{Evolver, Finished};
 use tests::tools::{self, Missing};
 
-/// A few seconds of runs for each of three tasks.
+/// Runs of a few seconds for each of three tasks.
 const SUITE: &str = "
 name = \"own\"
 
@@ -31,13 +31,13 @@ repetitions = 4
 steps = 300
 ";
 
-/// How long anything may take. A dead node's task is started again after half a minute.
+/// Maximum duration of any operation. A dead node's task is restarted after half a minute.
 const PATIENCE: Duration = Duration::from_secs(180);
 
-/// Two clusters at once would only be slower.
+/// Only one cluster at a time: two would be slower.
 static ONE_CLUSTER: Mutex<()> = Mutex::new(());
 
-/// A cluster. Dropping it, or the death of this process, ends it with all that runs on it.
+/// A cluster. Dropping it, or the death of this process, ends it and everything that runs on it.
 struct Slurm {
     script: Child,
     input: Option<ChildStdin>,
@@ -47,14 +47,14 @@ struct Slurm {
 }
 
 impl Slurm {
-    /// A cluster in a new folder; none if the test is to be skipped.
+    /// A cluster in a new folder; `None` if the test is skipped.
     fn start(folder: &Path) -> Option<Self> {
         if !full::all_cases() {
             println!("SKIPPED: runs with TEST_ALL=1 only");
             return None;
         }
         tools::require(installed())?;
-        // A test that failed with the lock has ended its cluster nevertheless.
+        // A failed test that held the lock has still ended its cluster.
         let one = ONE_CLUSTER.lock().unwrap_or_else(|e| e.into_inner());
         let free = [(); 4].map(|()| TcpListener::bind("127.0.0.1:0").expect("a free port"));
         let ports = free.map(|port| port.local_addr().expect("it is bound").port());
@@ -98,7 +98,7 @@ impl Slurm {
         self.expect_answer("done");
     }
 
-    /// What a Slurm command prints.
+    /// The output of a Slurm command.
     fn ask(&self, command: &[&str]) -> String {
         let output = Command::new("timeout")
             .arg("60")
@@ -123,11 +123,11 @@ impl Slurm {
             .collect()
     }
 
-    /// Starts what was requeued, which Slurm would let wait for two minutes.
+    /// Starts requeued tasks, which Slurm would delay by two minutes.
     fn hurry(&self, job: &str) {
         for (task, [state, _, reason]) in self.tasks(job) {
             if state == "PENDING" && reason == "BeginTime" {
-                // A node refuses a job in the second in which it has ended it.
+                // A node refuses a job within the second in which it ended that job.
                 std::thread::sleep(Duration::from_secs(3));
                 let task = format!("jobid={job}_{task}");
                 self.ask(&["scontrol", "update", &task, "StartTime=now"]);
@@ -135,7 +135,7 @@ impl Slurm {
         }
     }
 
-    /// Exit code and state of a task, running or ended, and how often it was started again.
+    /// Exit code and state of a task, running or ended, and how often it was restarted.
     fn task(&self, job: &str, task: u32) -> BTreeMap<String, String> {
         let text = self.ask(&[
             "scontrol",
@@ -158,7 +158,7 @@ impl Slurm {
         evolver.run_with(("SLURM_CONF", conf.as_ref()), arguments)
     }
 
-    /// Submits the suite in so many tasks; the job's number.
+    /// Submits the suite as the given number of tasks; returns the job's number.
     fn submit(&self, evolver: &Evolver, shards: &str) -> String {
         let submit = format!("suite own.toml submit --engine slurm --shards {shards} --out suite");
         let run = self.evolver(evolver, &submit.split(' ').collect::<Vec<_>>());
@@ -177,7 +177,7 @@ impl Drop for Slurm {
                 text.lines().skip(from).for_each(|line| println!("{line}"));
             }
         }
-        // The script ends everything at the end of its input.
+        // The script ends everything when its input ends.
         self.input = None;
         let _ = self.script.wait();
     }
@@ -190,7 +190,7 @@ fn installed() -> Result<(), Missing> {
         )))
     };
     for program in ["slurmctld", "slurmd", "sbatch", "munged"] {
-        // That it starts is all that is asked: without a cluster, some complain.
+        // It only has to start: without a cluster, some commands fail.
         if Command::new(program).arg("-V").output().is_err() {
             return missing(&format!(
                 "{program} (packages slurmctld slurmd slurm-client munge)"
@@ -210,7 +210,7 @@ fn installed() -> Result<(), Missing> {
     }
 }
 
-/// Asks until it is so.
+/// Polls until the condition holds.
 fn until(what: &str, mut is_so: impl FnMut() -> bool) {
     let started = Instant::now();
     while !is_so() {
@@ -243,7 +243,7 @@ fn hash(evolver: &Evolver) -> String {
         .to_owned()
 }
 
-/// Every file of the runs but `meta.json`, which says by which command, and `time.json`.
+/// Every file of the runs except `meta.json`, which holds the command, and `time.json`.
 fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files
@@ -253,7 +253,7 @@ fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-/// The suite on this machine alone.
+/// The suite run on this machine alone.
 fn alone(threads: &str) -> Evolver {
     let evolver = with_the_suite();
     let run = [
@@ -270,7 +270,7 @@ fn alone(threads: &str) -> Evolver {
     evolver
 }
 
-/// The suite by GNU parallel.
+/// The suite run by GNU parallel.
 fn parallel() -> Evolver {
     let evolver = with_the_suite();
     let task = "run-task --suite own.toml --out suite --threads 1 --shard {}/3";
@@ -304,7 +304,7 @@ fn a_node_that_dies_in_a_real_slurm_changes_no_byte() {
     };
     let evolver = with_the_suite();
     let job = slurm.submit(&evolver, "3");
-    // The tasks have copies.
+    // The tasks use copies.
     evolver.write("own.toml", b"edited");
     until("a task on each node, and each with a run", || {
         let on_nodes = |task: &[String; 3]| task[0] == "RUNNING";
@@ -359,7 +359,7 @@ fn a_node_that_dies_in_a_real_slurm_changes_no_byte() {
 }
 
 #[test]
-fn what_a_real_slurm_terminates_and_requeues_goes_on_without_harm() {
+fn tasks_that_a_real_slurm_terminates_and_requeues_continue_without_loss() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let Some(slurm) = Slurm::start(&folder.path().join("slurm")) else {
         return;
@@ -372,7 +372,7 @@ fn what_a_real_slurm_terminates_and_requeues_goes_on_without_harm() {
             .iter()
             .any(|file| file.ends_with("/checkpoint"))
     });
-    // As at the end of a time limit.
+    // As at a time limit.
     slurm.ask(&["scancel", "--signal=TERM", "--batch", &format!("{job}_0")]);
     until("the end of what was terminated", || {
         !slurm.tasks(&job).contains_key(&0)
@@ -385,7 +385,7 @@ fn what_a_real_slurm_terminates_and_requeues_goes_on_without_harm() {
             .contains("interrupted")
     );
 
-    // While it runs, and while others do.
+    // While it runs, and while other tasks run.
     slurm.ask(&["scontrol", "requeue", &format!("{job}_0")]);
     slurm.ask(&["scontrol", "requeue", &format!("{job}_1")]);
     until("the array's end", || {
@@ -414,7 +414,7 @@ fn what_a_real_slurm_terminates_and_requeues_goes_on_without_harm() {
 }
 
 #[test]
-fn a_share_that_a_real_slurm_does_twice_at_once_is_as_if_done_once() {
+fn a_shard_that_a_real_slurm_runs_twice_at_once_gives_the_result_of_one() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let Some(slurm) = Slurm::start(&folder.path().join("slurm")) else {
         return;
@@ -428,7 +428,7 @@ fn a_share_that_a_real_slurm_does_twice_at_once_is_as_if_done_once() {
         let runs_now =
             |tasks: &BTreeMap<u32, [String; 3]>| tasks.values().any(|task| task[0] == "RUNNING");
         at_once |= tasks.iter().all(runs_now);
-        // As on a file system without locks: nobody meets the lock of another.
+        // As on a file system without locks: no process sees the lock of another.
         for run in fs::read_dir(&runs).into_iter().flatten().flatten() {
             let _ = fs::remove_file(run.path().join(".lock"));
         }
@@ -443,7 +443,7 @@ fn a_share_that_a_real_slurm_does_twice_at_once_is_as_if_done_once() {
 }
 
 #[test]
-fn a_real_slurm_refuses_too_many_tasks_and_hears_of_one_that_failed() {
+fn a_real_slurm_refuses_too_many_tasks_and_reports_a_failed_one() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let Some(slurm) = Slurm::start(&folder.path().join("slurm")) else {
         return;

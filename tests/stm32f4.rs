@@ -1,4 +1,4 @@
-//! Program, slots and what is written there by a debug probe agree on the chip's flash.
+//! The program, the slots and the export for debug probes agree on the layout of the chip's flash.
 
 use firmware_example::stm32f4::{
     FLASH_ADDRESS, FLASH_BYTES, SECTOR_BYTES, SLOT_0_ADDRESS, SLOT_1_ADDRESS, SLOTS_BYTES,
@@ -30,7 +30,7 @@ fn the_program_ends_where_the_slots_begin() {
 }
 
 #[test]
-fn the_page_on_the_robot_names_these_places() {
+fn the_documentation_of_the_robot_names_these_addresses() {
     let page = include_str!("../docs/robot.md");
     for (what, address) in [
         ("program", FLASH_ADDRESS),

@@ -1,8 +1,8 @@
-//! What the scripts that the paper's authors published counted in the states of
-//! `fixtures/structures` (or of the file named by `STRUCTURES_FILE`), against ours.
+//! Compares our counts with those of the scripts published by the paper's authors, for the states
+//! in `fixtures/structures` (or in the file named by `STRUCTURES_FILE`).
 //!
-//! Ours differ on purpose in two rules, both about the edge of the torus. [`EdgeRules`] has the
-//! scripts' side of them, so that a difference can be traced to one.
+//! Our rules differ on purpose in two points, both about the edge of the torus. [`EdgeRules`] also
+//! implements the scripts' rules, so that a difference can be attributed to one of them.
 
 use minimal_surprise_sim::scenario::random_poses;
 use minimal_surprise_sim::structures::{Structure, classify};
@@ -13,13 +13,13 @@ use tests::structures::{Counts, State, states};
 
 type Cell = (u16, u16);
 
-/// How the edge of the torus is read. Ours: true, true. The scripts': false, false.
+/// Rules at the edge of the torus. Ours: true, true. The scripts': false, false.
 #[derive(Clone, Copy)]
 struct EdgeRules {
     /// Neighbours beside a line or pair are adjacent across the edge.
     neighbours_adjacent_across: bool,
-    /// A run across the edge may still hold a line when outward robots are dropped from it. The
-    /// scripts lose the line where the robots dropped are all those before the edge.
+    /// A run across the edge may still contain a line when outward robots are dropped from it. The
+    /// scripts lose the line if all robots before the edge are dropped.
     dropped_lines_stay_whole: bool,
 }
 
@@ -45,7 +45,7 @@ struct Track {
 }
 
 impl Track {
-    /// The cell at a place along the track, `aside` cells beside it.
+    /// The cell at a position along the track, `aside` cells beside it.
     fn cell(self, grid: Grid, along: u16, aside: i32) -> Cell {
         if self.horizontal {
             grid.moved(along % self.length, self.across, 0, aside)
@@ -85,8 +85,8 @@ impl PlainReading<'_> {
         }
     }
 
-    /// The counts with the lines, pairs and dispersed robots of this reading; the others, which
-    /// the rules do not touch, are the library's.
+    /// The counts with the lines, pairs and dispersed robots of this reading; the other counts,
+    /// which the rules do not affect, come from the library.
     fn counts(&self) -> Counts {
         let structures = classify(self.grid, &self.state.poses).unwrap();
         let mut counts = Counts::of(&structures);
@@ -154,7 +154,7 @@ impl PlainReading<'_> {
         self.headings.get(&track.cell(self.grid, along, 0)).copied()
     }
 
-    /// Lines of a track as first place and length.
+    /// Lines of a track as first position and length.
     fn lines(&self, track: Track) -> Vec<(u16, u16)> {
         let on_track = |along| {
             let heading = self.heading(track, along);
@@ -238,7 +238,7 @@ impl PlainReading<'_> {
     }
 }
 
-/// How many counts of how many states are equal, and the states that differ.
+/// The number of equal counts, the number of equal states, and the states that differ.
 fn compare(states: &[State], ours: impl Fn(&State) -> Counts) -> (usize, usize, Vec<&State>) {
     let (mut compared, mut equal, mut differing) = (0, 0, Vec::new());
     for state in states {
@@ -258,7 +258,7 @@ fn library(state: &State) -> Counts {
 }
 
 #[test]
-fn counts_and_verdicts_are_those_of_the_authors_scripts_but_for_two_rules() {
+fn counts_and_verdicts_agree_with_the_authors_scripts_except_for_two_rules() {
     let states = states();
     let (compared, equal, differing) = compare(&states, library);
     let share = equal as f64 / compared as f64;

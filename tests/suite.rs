@@ -1,4 +1,5 @@
-//! Suites, run as a user would run them: one machine or many, interrupted or not, one result.
+//! Suites, run as a user would run them: the result is the same on one machine or many, interrupted
+//! or not.
 
 use minimal_surprise_evolver::suite::plan::Plan;
 use minimal_surprise_evolver::suite::{Suite, report};
@@ -16,7 +17,7 @@ use tests::full;
 use tests::program::{Evolver, Finished};
 use tests::tools::{self, Missing};
 
-/// Two settings, three runs each, a moment long.
+/// Two settings with three short runs each.
 const SUITE: &str = "
 name = \"own\"
 
@@ -47,12 +48,12 @@ fn with_the_suite() -> Evolver {
     evolver
 }
 
-/// The hash of all runs, as `status` says it.
+/// The hash of all runs, as printed by `status`.
 fn hash_by_status(evolver: &Evolver) -> String {
     hash_by(evolver, &[])
 }
 
-/// The hash of some runs, as `status` says it.
+/// The hash of some runs, as printed by `status`.
 fn hash_by(evolver: &Evolver, choice: &[&str]) -> String {
     let status = ["suite", "own.toml", "status", "--out", "suite"];
     let status = evolver.run(&[&status[..], choice].concat());
@@ -70,7 +71,7 @@ fn expected() -> String {
     evolver.text("suite/hashes.txt")
 }
 
-/// The hashes of a suite that shares did, in the order of the whole.
+/// The hashes of a suite that was run in shards, in the order of the whole suite.
 fn hashes_after(evolver: &Evolver) -> String {
     let run = evolver.run(&RUN);
     assert_eq!(run.code, Some(0), "{run:?}");
@@ -93,7 +94,7 @@ fn kills_at_random_moments_change_no_hash() {
     let whole = with_the_suite();
     let started = Instant::now();
     assert_eq!(whole.run(&RUN).code, Some(0));
-    // However busy the machine is, a process gets somewhere before it is killed.
+    // Even on a busy machine, a process makes progress before it is killed.
     let longest = started.elapsed().as_micros() as u32;
     let expected = whole.text("suite/hashes.txt");
     let (mut kills, mut suites) = (0, 0);
@@ -191,7 +192,7 @@ fn gnu_parallel_runs_the_shards() {
 }
 
 #[test]
-fn a_task_ends_well_only_when_its_share_is_done() {
+fn a_task_succeeds_only_when_its_shard_is_done() {
     let expected = expected();
     for patience in [0, 20, 500] {
         let evolver = with_the_suite();
@@ -215,7 +216,8 @@ fn a_task_ends_well_only_when_its_share_is_done() {
     }
 }
 
-/// A folder with programs of Slurm's names, which keep what they are told and say what Slurm would.
+/// A folder with programs named like Slurm's, which record their arguments and print what Slurm
+/// would.
 fn fake_slurm(evolver: &Evolver, sbatch: &str) -> String {
     let programs = [
         ("sbatch", sbatch),
@@ -240,7 +242,7 @@ const SUBMIT: [&str; 9] = [
 ];
 
 #[test]
-fn a_queued_task_does_not_meet_what_was_edited_or_submitted_later() {
+fn a_queued_task_is_not_affected_by_later_edits_or_submissions() {
     let evolver = with_the_suite();
     let path = fake_slurm(
         &evolver,
@@ -275,7 +277,7 @@ fn a_queued_task_does_not_meet_what_was_edited_or_submitted_later() {
 }
 
 #[test]
-fn a_refused_submission_says_what_the_cluster_takes_and_leaves_nothing() {
+fn a_refused_submission_reports_the_clusters_limit_and_leaves_nothing() {
     let evolver = with_the_suite();
     let path = fake_slurm(
         &evolver,
@@ -311,8 +313,8 @@ fn two_processes_share_the_work() {
     assert_eq!(hashes_after(&evolver), expected());
 }
 
-/// Every file of the runs but `meta.json` and `time.json`, which say by which command and how long,
-/// and what a process left that was killed before a run had its name.
+/// Every file of the runs except `meta.json` and `time.json`, which hold the command and the
+/// duration, and the leftovers of processes that were killed before a run had its name.
 fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files
@@ -324,7 +326,7 @@ fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
 }
 
 #[test]
-fn processes_that_know_no_locks_leave_what_one_leaves() {
+fn processes_without_locks_leave_the_files_of_one() {
     let alone = with_the_suite();
     assert_eq!(alone.run(&RUN).code, Some(0));
     let expected = contents(&alone);
@@ -334,7 +336,7 @@ fn processes_that_know_no_locks_leave_what_one_leaves() {
         let runs = evolver.folder().join("suite/runs");
         ended.store(false, Ordering::Relaxed);
         std::thread::scope(|scope| {
-            // As on a file system without locks: nobody meets the lock of another.
+            // As on a file system without locks: no process sees the lock of another.
             let remover = scope.spawn(|| {
                 let mut removed = 0;
                 while !ended.load(Ordering::Relaxed) {
@@ -394,7 +396,7 @@ fn plan_and_status_count_the_runs() {
 }
 
 #[test]
-fn a_run_of_a_suite_is_the_run_of_its_settings() {
+fn a_run_of_a_suite_equals_a_run_with_its_settings() {
     let evolver = with_the_suite();
     let run = evolver.run(&[&RUN[..], &["--runs", "1"]].concat());
     assert_eq!(run.code, Some(0), "{run:?}");
@@ -408,7 +410,7 @@ fn a_run_of_a_suite_is_the_run_of_its_settings() {
 }
 
 #[test]
-fn the_hashes_of_a_part_do_not_take_the_place_of_the_wholes() {
+fn the_hashes_of_a_part_do_not_replace_those_of_the_whole() {
     let evolver = with_the_suite();
     let part = |choice: &[&str]| {
         let run = evolver.run(&[&RUN[..], choice].concat());
@@ -431,7 +433,7 @@ fn the_hashes_of_a_part_do_not_take_the_place_of_the_wholes() {
 }
 
 #[test]
-fn bad_suites_are_refused_with_their_place() {
+fn bad_suites_are_refused_with_the_position_of_the_error() {
     let evolver = Evolver::in_empty_folder();
     let suite = |text: &str| {
         evolver.write("own.toml", text.as_bytes());
@@ -469,7 +471,7 @@ fn bad_suites_are_refused_with_their_place() {
 }
 
 #[test]
-fn a_path_of_the_engine_that_there_is_not_is_refused_before_anything_is_done() {
+fn an_unknown_engine_path_is_refused_before_anything_is_done() {
     let evolver = with_the_suite();
     let task = [
         "run-task", "--suite", "own.toml", "--shard", "0/2", "--out", "suite",
@@ -516,7 +518,7 @@ fn a_run_whose_lock_cannot_be_opened_is_named_and_the_others_are_done() {
     assert_eq!(hashes_after(&evolver), hashes);
 }
 
-/// A suite that searches for what no run of it is named after.
+/// A suite that searches for a structure that none of its runs has.
 fn with_a_search() -> Evolver {
     let evolver = Evolver::in_empty_folder();
     let text = format!(
@@ -528,7 +530,7 @@ fn with_a_search() -> Evolver {
 }
 
 #[test]
-fn a_damaged_run_beyond_the_plan_is_named_and_ends_only_its_search() {
+fn a_damaged_run_beyond_the_plan_is_named_and_only_ends_its_search() {
     let evolver = with_a_search();
     let suite = Suite::read(&evolver.folder().join("own.toml")).unwrap();
     let plan = Plan::new(&suite, None, None, false).unwrap();
@@ -543,9 +545,9 @@ fn a_damaged_run_beyond_the_plan_is_named_and_ends_only_its_search() {
 }
 
 #[test]
-fn a_suite_on_a_full_disk_says_so_and_goes_on_when_there_is_room() {
+fn a_suite_on_a_full_disk_says_so_and_is_resumed_when_there_is_room() {
     let evolver = with_the_suite();
-    // Bytes enough, so that it is begun, but not for as many files.
+    // Enough bytes to start the suite, but too few inodes for its files.
     let Some(disk) = tools::require(Disk::mounted_at(
         evolver.folder().join("suite"),
         "8m,nr_inodes=30",
@@ -563,7 +565,7 @@ fn a_suite_on_a_full_disk_says_so_and_goes_on_when_there_is_room() {
 }
 
 #[test]
-fn a_report_goes_where_it_is_asked_for_and_replaces_nothing_but_a_report() {
+fn a_report_is_written_where_requested_and_replaces_only_a_report() {
     let evolver = with_the_suite();
     assert_eq!(evolver.run(&RUN).code, Some(0));
     let report =
@@ -586,7 +588,7 @@ fn a_report_goes_where_it_is_asked_for_and_replaces_nothing_but_a_report() {
     assert_eq!(report("said").code, Some(0));
 
     let (ours, kept) = (evolver.read("results/report.html"), b"dear");
-    // A page of ours alone does not make a directory ours.
+    // One of our pages alone does not make a directory a report.
     fs::create_dir(evolver.folder().join("saved")).unwrap();
     evolver.write("saved/report.html", &ours);
     evolver.write("saved/mother.txt", kept);
@@ -619,7 +621,7 @@ fn a_report_goes_where_it_is_asked_for_and_replaces_nothing_but_a_report() {
 }
 
 #[test]
-fn the_report_of_the_papers_runs_may_be_written_again() {
+fn the_report_of_the_papers_runs_can_be_written_again() {
     let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/results");
     assert!(report::may_be_written(&results).unwrap());
 }
@@ -681,7 +683,7 @@ fn all_damaged_runs_are_named_and_the_others_are_done_shown_and_reported() {
         .lines()
         .map(|line| format!("suite/runs/{}", &line[..16]))
         .collect();
-    // Cut, of other contents, a directory where a file should be, missing; and one not done.
+    // Truncated, with other contents, a directory instead of a file, missing; and one not done.
     let state = evolver.text(&format!("{}/final.json", runs[0]));
     evolver.write(&format!("{}/final.json", runs[0]), &state.as_bytes()[..300]);
     evolver.write(&format!("{}/DONE", runs[1]), b"zzz\n");
@@ -770,7 +772,7 @@ fn a_run_with_a_damaged_checkpoint_is_named_and_the_others_are_done() {
 }
 
 #[test]
-fn a_report_of_no_run_at_all_is_refused() {
+fn a_report_without_runs_is_refused() {
     let evolver = with_the_suite();
     let report = ["suite", "own.toml", "report", "--out", "siute"];
     assert_refused(&evolver.run(&report), &["siute", "--out"]);
@@ -779,9 +781,9 @@ fn a_report_of_no_run_at_all_is_refused() {
 }
 
 #[test]
-fn after_tasks_it_is_said_which_command_searches_for_a_structure() {
+fn after_tasks_the_command_that_searches_for_a_structure_is_printed() {
     let evolver = Evolver::in_empty_folder();
-    // Lines are not to be had of two robots.
+    // Two robots cannot form a line.
     let damage = "[[resilience]]\nname = \"damage\"\nof = \"two-grids\"\nstructure = \"line\"\n\
                   robots-in-areas = [1]\nrepeat = 1\nfurther-runs = 3\n";
     let suite = SUITE.replace("[20]", "[2]") + damage;
@@ -818,7 +820,7 @@ fn after_tasks_it_is_said_which_command_searches_for_a_structure() {
     assert!(!again.contains(command), "{again}");
 }
 
-/// The keys that something wrong is said to be none of.
+/// The valid keys listed by the error for an unknown key.
 fn keys_said_with(suite: &str) -> Vec<String> {
     let error = Suite::parse(Path::new("own.toml"), suite).unwrap_err();
     let text = error.to_string();
@@ -859,7 +861,7 @@ fn every_key_of_a_suite_is_explained() {
 }
 
 #[test]
-fn a_suite_in_a_directory_that_is_read_only_says_so_and_what_is_done_can_be_read() {
+fn a_suite_in_a_read_only_directory_says_so_and_finished_runs_can_be_read() {
     let evolver = with_the_suite();
     let Some(disk) = tools::require(Disk::mounted_at(evolver.folder().join("suite"), "8m")) else {
         return;

@@ -1,4 +1,4 @@
-//! Text from users: each form that it is turned into is read back by the program that reads it.
+//! Text from users: each encoding of it is decoded correctly by the program that reads it.
 
 use minimal_surprise_evolution::text::{
     self, FILE_NAME_BYTES_MAX, TextError, decode, file_name, file_name_except, html, is_hidden,
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tests::full::all_cases;
 
-/// Texts that have gone wrong, or could.
+/// Texts that have caused errors, or could.
 const HARD: [&str; 32] = [
     "",
     " ",
@@ -65,7 +65,7 @@ fn hard() -> impl Iterator<Item = String> {
     own.chain(["x".repeat(300), "é".repeat(300)])
 }
 
-/// Mostly characters that mean something to somebody.
+/// Mostly characters with a special meaning in some format.
 fn any_text() -> impl Strategy<Value = String> {
     let special = "[ -~\n\t\r\u{1b}\u{7f}\u{85}\u{200b}\u{202e}\u{2066}\u{feff}éß√▶]{0,12}";
     prop_oneof![special, "\\PC{0,12}", any::<String>(), "[a-b.-]{0,5}"]
@@ -113,7 +113,7 @@ fn check_file_name(text: &str) -> Result<(), TestCaseError> {
 }
 
 #[test]
-fn a_file_name_is_short_portable_and_of_one_text_only() {
+fn a_file_name_is_short_portable_and_unique_to_its_text() {
     let mut names = BTreeMap::new();
     let twins = ["Noise", "noise", "NOISE", "noise ", "noise/", "noise\\"];
     for text in hard().chain(twins.map(str::to_owned)) {
@@ -136,7 +136,7 @@ fn a_file_name_is_short_portable_and_of_one_text_only() {
 }
 
 #[test]
-fn what_cannot_be_seen_is_shown() {
+fn invisible_characters_are_made_visible() {
     assert_eq!(
         text::terminal("a\u{1b}[2Jb\n\u{202e}"),
         r"a\u{1b}[2Jb\n\u{202e}"
@@ -161,7 +161,7 @@ fn what_cannot_be_seen_is_shown() {
     }
 }
 
-/// What `sh` takes each of some words for.
+/// How `sh` reads each of some words.
 fn read_by_sh(words: &[String]) -> Vec<Vec<u8>> {
     let script = format!(
         "for word in {}; do printf '%s\\0' \"$word\"; done",
@@ -174,7 +174,7 @@ fn read_by_sh(words: &[String]) -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn a_shell_reads_a_word_back_whatever_its_bytes_are() {
+fn a_shell_reads_back_a_word_of_any_bytes() {
     let check = |words: &[Vec<u8>]| {
         let quoted: Vec<String> = words
             .iter()
@@ -237,7 +237,7 @@ fn a_browser_reads_a_link_back_as_the_path() {
 }
 
 #[test]
-fn a_page_shows_text_as_it_is() {
+fn a_page_shows_text_unchanged() {
     let check = |text: &str| {
         let page = format!("<p title=\"{0}\" lang='{0}'>{0}</p>", html(text));
         let read = roxmltree::Document::parse(&page).unwrap();
@@ -249,14 +249,14 @@ fn a_page_shows_text_as_it_is() {
     };
     hard().for_each(|text| check(&text));
     proptest!(config(300), |(text in any_text())| {
-        // What XML has no characters for.
+        // Characters that XML does not allow.
         prop_assume!(!text.contains(['\u{fffe}', '\u{ffff}']));
         check(&text);
     });
 }
 
-/// The only text in a Markdown document's only row of a table, heading or list item, and whether
-/// anything else is in it.
+/// The text of a Markdown document's only table row, heading or list item, and whether the document
+/// contains anything else.
 fn cells(document: &str) -> (Vec<String>, bool) {
     let (mut cells, mut inside, mut other) = (Vec::new(), false, false);
     for event in Parser::new_ext(
@@ -281,7 +281,7 @@ fn cells(document: &str) -> (Vec<String>, bool) {
 }
 
 #[test]
-fn markdown_shows_text_as_it_is_in_tables_and_lists() {
+fn markdown_shows_text_unchanged_in_tables_and_lists() {
     let check = |text: &str| {
         let shown = text::terminal(text);
         let (text_cell, code_cell) = (markdown(text), markdown_code_cell(text));
@@ -302,7 +302,7 @@ fn markdown_shows_text_as_it_is_in_tables_and_lists() {
 }
 
 #[test]
-fn a_text_file_is_read_whatever_program_saved_it() {
+fn a_text_file_is_read_in_the_forms_that_programs_save() {
     assert_eq!(decode(b"\xef\xbb\xbfa\r\nb\n"), Ok("a\nb\n".to_owned()));
     let utf16 = |text: &str, order: fn(u16) -> [u8; 2]| -> Vec<u8> {
         text.encode_utf16().flat_map(order).collect()
@@ -323,7 +323,7 @@ fn a_text_file_is_read_whatever_program_saved_it() {
         assert_eq!(decode(bytes), Err(TextError::NotUtf8 { line, byte }));
     }
     proptest!(config(300), |(text in any_text())| {
-        // What begins with zeros is taken for UTF-16.
+        // Text that begins with zeros is taken for UTF-16.
         prop_assume!(!text.contains('\0'));
         let text = text.replace(['\r', '\u{feff}'], "");
         let windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));

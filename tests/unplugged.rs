@@ -1,8 +1,8 @@
 //! The robot's plug is pulled during `evolver flash`: QEMU is killed, at chosen flash operations and
 //! at random moments. `TEST_ALL=1` kills it more often.
 //!
-//! A failure prints which kill it was; kills depend on [`SEED`] and their number alone, as far as
-//! a host's clock lets them.
+//! A failure prints the number of the kill; kills depend only on [`SEED`] and their number, as far
+//! as the host's clock allows.
 
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, Provenance, encode};
 use minimal_surprise_controller::{
@@ -28,14 +28,14 @@ const SEED: u64 = 11;
 /// Kills, and kills with `TEST_ALL=1`.
 const KILLS: u32 = 40;
 const KILLS_ALL: u32 = 200;
-/// Bytes that the robot erases at a time, and in one step of that.
+/// Bytes that the robot erases at a time, and in one step of an erase.
 const ERASE_BYTES: usize = 4096;
 const ERASE_STEP_BYTES: usize = 512;
 /// Bytes of a word of its flash.
 const WORD_BYTES: usize = 4;
 type Word = [u8; WORD_BYTES];
 const ERASED: Word = [0xff; WORD_BYTES];
-/// Where a slot's header has the write count.
+/// Offset of the write count in a slot's header.
 const WRITE_COUNT_AT: usize = 4;
 /// Longest to wait for a flash operation.
 const OPERATION_WAIT: Duration = Duration::from_secs(20);
@@ -45,13 +45,13 @@ const OPERATION_WAIT: Duration = Duration::from_secs(20);
 enum Kill {
     /// As soon as this step of the slot's erase is done.
     Erased { step: usize },
-    /// As soon as the word at this place in the slot is written.
+    /// As soon as the word at this offset in the slot is written.
     Written { at: usize },
-    /// After so much of the time that an update takes, in thousandths.
+    /// After this fraction of the duration of an update, in thousandths.
     After { thousandths: u32 },
 }
 
-/// The bytes of the slot that is written, in the file.
+/// The bytes, in the file, of the slot being written.
 struct SlotBytes {
     flash: File,
     start: u64,
@@ -77,13 +77,13 @@ impl SlotBytes {
         word
     }
 
-    /// Whether the word is no longer what it was before the update.
+    /// Whether the word has changed since before the update.
     fn is_changed(&self, at: usize) -> bool {
         self.word(at) != self.before[at..at + WORD_BYTES]
     }
 
-    /// The last word that an erase step takes away; at the slot's start the write count, for every
-    /// header begins with the same word.
+    /// The last word erased by a step; at the slot's start the write count, because every header
+    /// begins with the same word.
     fn last_word(&self, step: usize) -> usize {
         let from = step * ERASE_STEP_BYTES;
         let mut words = (from..from + ERASE_STEP_BYTES).step_by(WORD_BYTES);
@@ -94,7 +94,7 @@ impl SlotBytes {
 }
 
 impl Kill {
-    /// Every second kill is at a flash operation. These go evenly through all of an update: the
+    /// Every second kill is at a flash operation. These kills are spread evenly over an update: the
     /// steps of the erase, the words of the header, of the container, of the commit record.
     fn choose(index: u32, kills: u32, container_bytes: usize) -> Self {
         if index % 2 == 1 {
@@ -108,12 +108,13 @@ impl Kill {
                 .step_by(WORD_BYTES)
                 .map(|at| Self::Written { at })
         };
-        // Beyond the container there is nothing that an erase would change.
+        // Beyond the container an erase changes nothing.
         let steps = (CONTAINER_AT as usize + container_bytes).div_ceil(ERASE_STEP_BYTES);
         let operations: Vec<Self> = (0..steps)
             .map(|step| Self::Erased { step })
             .chain(words(0, 16))
-            // One in so many: each is as dangerous, and there are far more than of the others.
+            // Only a sample: each is equally dangerous, and there are far more of them than of the
+            // others.
             .chain(words(CONTAINER_AT, container_bytes).step_by(16))
             .chain(words(COMMIT_AT, 8))
             .collect();
@@ -134,7 +135,7 @@ impl Kill {
                 let at = slot.last_word(step);
                 until(&|| slot.is_changed(at));
             }
-            // All is erased before the first word of the header is written.
+            // The whole slot is erased before the first word of the header is written.
             Self::Written { at } => {
                 until(&|| slot.is_changed(WRITE_COUNT_AT));
                 if at >= WRITE_COUNT_AT {
@@ -147,7 +148,7 @@ impl Kill {
     }
 }
 
-/// Says which kill it was if the test fails.
+/// Prints the number of the kill if the test fails.
 struct Failing(u32, Kill);
 
 impl Drop for Failing {
@@ -161,7 +162,8 @@ impl Drop for Failing {
 /// The genome container of one generation, of any topology.
 fn container(generation: u32) -> Vec<u8> {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED + u64::from(generation));
-    // A network that predicts everything makes the longest container; kills are spread over that.
+    // A network that predicts everything has the longest container, over which the kills are
+    // spread.
     let topology = match generation % 2 {
         0 => Topology::default(),
         _ => Topology::ALL[generation as usize / 2 % Topology::ALL.len()],
@@ -176,10 +178,10 @@ fn container(generation: u32) -> Vec<u8> {
     encode(&genome, provenance, &mut buffer).unwrap().to_vec()
 }
 
-/// A robot that is switched on.
+/// A running robot.
 struct Robot {
     qemu: QemuRobot,
-    /// What it said when it was asked first.
+    /// The genome it reported first.
     genome: GenomeInUse,
 }
 
@@ -190,7 +192,7 @@ impl Robot {
         Ok(Self { qemu, genome })
     }
 
-    /// Shows that the genome is the one that decides.
+    /// Asserts that this genome makes the decisions.
     fn must_run(&self, container: &[u8], running: bool, rng: &mut ChaCha8Rng) {
         let (mut line, in_use) = identify(&self.qemu, rng, running);
         assert!(is_in_use(in_use, container), "{in_use:?}");
@@ -216,7 +218,7 @@ impl Robot {
         }
     }
 
-    /// Writes a genome and says how long that took.
+    /// Writes a genome and returns how long that took.
     fn update(&self, evolver: &Evolver, container: &[u8]) -> Duration {
         let started = Instant::now();
         let flashed = flash(evolver, &self.qemu.port, container);
@@ -225,7 +227,7 @@ impl Robot {
     }
 }
 
-/// A session of the line of a robot, and the genome in use.
+/// Opens a session with a robot; returns it and the genome in use.
 fn identify(qemu: &QemuRobot, rng: &mut ChaCha8Rng, running: bool) -> (Line, GenomeInUse) {
     let mut line = Line::open(&qemu.port, rng.next_u32()).unwrap();
     let identified = line.ask(&Request::Identify, |reply| match reply {
@@ -239,13 +241,13 @@ fn identify(qemu: &QemuRobot, rng: &mut ChaCha8Rng, running: bool) -> (Line, Gen
     (line, identified.unwrap())
 }
 
-/// `evolver flash`, to its end.
+/// Runs `evolver flash` to its end.
 fn flash(evolver: &Evolver, port: &str, container: &[u8]) -> Finished {
     evolver.write("new.genome", container);
     evolver.run(&["flash", "new.genome", "--port", port])
 }
 
-/// Which of its slots a robot writes next, as a place in the file.
+/// The offset in the file of the slot that a robot writes next.
 fn slot_to_write(genome: GenomeInUse) -> u64 {
     match genome {
         GenomeInUse::Slot { slot: 0, .. } => slot_bytes(ERASE_BYTES) as u64,
@@ -253,7 +255,7 @@ fn slot_to_write(genome: GenomeInUse) -> u64 {
     }
 }
 
-/// How many errors a program has said.
+/// The number of errors printed by a program.
 fn said(finished: &Finished) -> usize {
     let lines = finished.stderr.lines();
     lines.filter(|line| line.starts_with("error: ")).count()
@@ -278,7 +280,7 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
     };
     assert_eq!(robot.genome, GenomeInUse::BuiltIn);
     let mut old = container(0);
-    // Both slots have been in use before the first kill: there is something to erase.
+    // Both slots have been used before the first kill, so there is something to erase.
     robot.update(&evolver, &container(u32::MAX));
     let mut update_time = robot.update(&evolver, &old);
     let mut slot = slot_bytes(ERASE_BYTES) as u64;
@@ -309,7 +311,7 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
             Some(0) => assert!(runs_new, "acknowledged, and gone"),
             Some(code @ (1 | 2)) => {
                 assert_eq!(said(&flashed), 1, "one clear message: {flashed:?}");
-                // The port went before it was opened, and only then is it bad input.
+                // The port disappeared before it was opened; only then is it bad input.
                 let no_port = flashed.stderr.contains("no such port");
                 assert_eq!(code == 2, no_port, "{flashed:?}");
                 unheard += u32::from(runs_new);
@@ -332,6 +334,6 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
          {unheard} of these unacknowledged; seed {SEED}",
         started.elapsed()
     );
-    // Or the kills come when nothing happens.
+    // Otherwise the kills miss the update.
     assert!(olds > kills / 2 && news > 0, "{olds} {news}");
 }

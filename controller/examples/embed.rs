@@ -1,4 +1,5 @@
-//! What a robot maker writes: ten lines of controller, and the robot's own sensors and motors.
+//! The code that a robot maker writes: ten lines for the controller, plus the robot's sensors and
+//! motors.
 //!
 //! Builds for the host and, unchanged, for a microcontroller:
 //! `cargo build -p minimal-surprise-controller --example embed --features neighbours`.
@@ -19,13 +20,13 @@ pub trait Robot {
 
 /// Why the robot did not start.
 pub enum StartError {
-    /// The genome is not one this controller runs.
+    /// The controller cannot run the genome.
     Genome(DecodeError),
     /// The cell size is not a positive number.
     CellSize(InvalidCellSize),
 }
 
-/// Runs the genome in `flash` on a grid of cells of `cell_mm`, forever.
+/// Runs the genome in `flash` forever, on a grid with cells of `cell_mm`.
 pub fn control_loop(robot: &mut impl Robot, flash: &[u8], cell_mm: f32) -> Result<(), StartError> {
     let genome = EncodedGenome::decode(flash).map_err(StartError::Genome)?;
     let cell = CellSize::from_mm(cell_mm).map_err(StartError::CellSize)?;

@@ -1,15 +1,16 @@
 //! The activation: tanh in Q3.12, as eight cubics.
 //!
-//! The magnitude `m = |x|` is scaled so that the segment number and the position inside the
-//! segment come out of one product: `z = 30·m`, segment `z >> 16`, position `t = (z & 0xffff) −
-//! 32768` in Q16, i.e. −½ ≤ t < ½. A segment is 65536 / 30 ≈ 2184.5 units (0.533) wide. Its cubic
-//! is evaluated by Horner's rule in units of 1/8, each step `(r·t >> 16) + c` truncating as
-//! `vpmulhw` does on x86; then shifted right by 3 and given the sign of x. Every intermediate fits
-//! `i16`, so a vector lane of 16 bits is enough, and eight coefficients of 16 bits fit one 128-bit
-//! byte shuffle. [`activate`] computes the same values in 32 bits, with multiply-accumulate
-//! instructions and without looking at the sign.
+//! The magnitude `m = |x|` is scaled so that one product yields the segment number and the position
+//! inside the segment: `z = 30·m`, segment `z >> 16`, position `t = (z & 0xffff) − 32768` in Q16,
+//! i.e. −½ ≤ t < ½. A segment is 65536 / 30 ≈ 2184.5 units (0.533) wide. Its cubic is evaluated by
+//! Horner's rule in units of 1/8, each step `(r·t >> 16) + c` truncating as `vpmulhw` does on x86;
+//! then shifted right by 3 and given the sign of x. Every intermediate fits `i16`, so a vector lane
+//! of 16 bits is enough, and eight coefficients of 16 bits fit one 128-bit byte shuffle.
+//! [`activate`] computes the same values in 32 bits, with multiply-accumulate instructions and
+//! without testing the sign.
 //!
-//! From 17476 units (4.27) on the value is 4095: within one unit of 4096·tanh for every larger x.
+//! From 17476 units (4.27) upwards the value is 4095: within one unit of 4096·tanh for every larger
+//! x.
 //!
 //! The function is frozen: [`KERNEL_ID`] holds a hash of all its values, and every genome
 //! container carries it.
@@ -17,13 +18,14 @@
 /// Segments per unit of 2¹⁶: multiplies the magnitude.
 pub const SEGMENT_SCALE: u16 = 30;
 
-/// Magnitudes above this have the value that it has.
+/// Larger magnitudes have the same activation as this one.
 pub const MAGNITUDE_CLAMP: u16 = 17475;
 
 /// Cubics over the eight segments: `[c0, c1, c2, c3]`, in units of 1/8 of Q3.12.
 ///
-/// Each is a least-squares fit to tanh over its segment, rounded, then moved by a few units to
-/// where the truncating evaluation is monotone, within one unit of tanh, and its largest error is smallest.
+/// Each is a least-squares fit to tanh over its segment, rounded, then adjusted by a few units so
+/// that the truncating evaluation is monotone, within one unit of tanh, and has the smallest
+/// maximum error.
 pub const SEGMENTS: [[i16; 4]; 8] = [
     [8538, 16288, -2171, -1196],
     [21762, 9773, -3406, 266],
@@ -38,13 +40,13 @@ pub const SEGMENTS: [[i16; 4]; 8] = [
 /// Value of the activation beyond the last segment, in units of 1/8.
 const TAIL: i32 = 4095 << 3;
 
-/// One row per value of `z >> 16`, 0 … 15 and −16 … −1, so that no input needs a clamp, a bounds
-/// check or its magnitude: what [`activate`] multiplies and adds, highest power first.
+/// The coefficients that [`activate`] uses, highest power first: one row per value of `z >> 16`, 0
+/// … 15 and −16 … −1, so that no input needs a clamp, a bounds check or its magnitude.
 ///
-/// An x < 0 has the segment −1 − s and the position −t where −x has s and t. (Where t is −½, −t
-/// does not fit; only 0 and −32768 have such a t, and they need none.) With −t, its row gives the
-/// negative of the first result, then the second as it is, then the negative of the third; its
-/// constants hold the d − 1 of ⌊(d − 1 − a) / d⌋ = −⌊a / d⌋.
+/// If −x has segment s and position t, then x < 0 has segment −1 − s and position −t. (−t does not
+/// fit where t is −½, but only 0 and −32768 have that t, and they do not need −t.) With −t, the row
+/// yields the first result negated, the second unchanged and the third negated; its constants
+/// include the d − 1 of ⌊(d − 1 − a) / d⌋ = −⌊a / d⌋.
 pub(crate) static ROWS: [[i32; 4]; 32] = {
     let mut rows = [[0; 4]; 32];
     let mut segment = 0;
@@ -84,7 +86,7 @@ fn mul_high(a: i32, b: i32) -> i32 {
     ((i64::from(a) * i64::from(b)) >> 16) as i32
 }
 
-/// Identity of the arithmetic: genomes evolved under one kernel are refused by another.
+/// Identifies the arithmetic: a controller refuses genomes evolved under another kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct KernelId(pub [u8; 8]);

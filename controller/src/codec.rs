@@ -10,8 +10,8 @@
 //! end   4  CRC-32C of everything before
 //! ```
 //!
-//! Decoding borrows the bytes. Every accepted container is the only encoding of what it holds:
-//! encoding that again gives the same bytes.
+//! Decoding borrows the bytes. Every accepted container is the only encoding of its contents:
+//! encoding them again yields the same bytes.
 
 use crate::activation::{KERNEL_ID, KernelId};
 use crate::genome::Genome;
@@ -26,14 +26,14 @@ pub const MAGIC: [u8; 4] = *b"MSGE";
 pub const FORMAT_VERSION: u8 = 1;
 /// Bytes before the header.
 pub const PREFIX_BYTES: usize = 8;
-/// Most bytes of a header.
+/// Maximum size of a header, in bytes.
 pub const HEADER_BYTES_MAX: usize = 53;
-/// Bytes of the checksum.
+/// Size of the checksum, in bytes.
 pub const CRC_BYTES: usize = 4;
-/// Most bytes of a container; a buffer of this size holds any genome.
+/// Maximum size of a container, in bytes; a buffer of this size holds any genome.
 pub const CONTAINER_BYTES_MAX: usize =
     PREFIX_BYTES + HEADER_BYTES_MAX + 2 * MAX_WEIGHTS + CRC_BYTES;
-/// Fewer bytes than this are no container, whatever they say.
+/// Minimum size of a container, in bytes.
 const CONTAINER_BYTES_MIN: usize = PREFIX_BYTES + CRC_BYTES;
 
 const _: () = assert!(HEADER_BYTES_MAX <= u8::MAX as usize);
@@ -46,11 +46,11 @@ pub static CRC_32C: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Provenance {
-    /// Seed of the evolutionary run, if it is known.
+    /// Seed of the evolutionary run, if known.
     pub seed: Option<u64>,
     /// Generation that the genome belongs to, counted from 0.
     pub generation: u32,
-    /// Correctly predicted bits of the repetition that gave the genome its fitness.
+    /// Correctly predicted bits in the repetition that determined the genome's fitness.
     pub matched_bits: u64,
     /// Bits sensed in that repetition: fitness is `matched_bits / scored_bits`; 0 if unknown.
     pub scored_bits: u64,
@@ -71,16 +71,17 @@ struct Header {
 /// The bytes are not a genome that this controller can run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum DecodeError {
     /// The bytes end before the container does.
     #[error("too short: {found} bytes of at least {needed}")]
     TooShort {
         /// Bytes given.
         found: usize,
-        /// Bytes needed, as far as is known.
+        /// Bytes needed, as far as known.
         needed: usize,
     },
-    /// The container cannot be as long as it says.
+    /// The length field is outside the valid range.
     #[error(
         "a length of {found} bytes; containers have {CONTAINER_BYTES_MIN} to {CONTAINER_BYTES_MAX}"
     )]
@@ -88,7 +89,7 @@ pub enum DecodeError {
         /// The length field.
         found: usize,
     },
-    /// There is more than the container.
+    /// Bytes follow the container.
     #[error("{found} bytes, but the container ends after {length}")]
     TrailingBytes {
         /// Bytes given.
@@ -102,7 +103,7 @@ pub enum DecodeError {
         /// The first four bytes.
         found: [u8; 4],
     },
-    /// Written in a format that this program does not know.
+    /// The format version is not supported.
     #[error("format version {found}; this program reads version {FORMAT_VERSION}")]
     UnknownVersion {
         /// The version byte.
@@ -116,15 +117,15 @@ pub enum DecodeError {
         /// The checksum of the bytes.
         computed: u32,
     },
-    /// The header cannot be as long as it says.
+    /// The header length byte is too large.
     #[error("a header of {found} bytes; there is room for at most {room}")]
     HeaderTooLong {
         /// The header length byte.
         found: usize,
-        /// Most bytes that a header of this container can have.
+        /// Maximum size of a header in this container, in bytes.
         room: usize,
     },
-    /// The header does not decode, or is not written the one way it is allowed to be.
+    /// The header does not decode, or is not in its canonical form.
     #[error(
         "malformed header: its {length} bytes are not exactly the fields of format version \
          {FORMAT_VERSION}, each in its shortest form"
@@ -139,13 +140,13 @@ pub enum DecodeError {
         /// The kernel of the genome.
         found: KernelId,
     },
-    /// No such sensor model.
+    /// Unknown sensor model.
     #[error("unknown sensor model {found}; 0 to 2 stand for A to C")]
     UnknownModel {
         /// The model byte.
         found: u8,
     },
-    /// No such kind of prediction or template.
+    /// Unknown kind of prediction or template.
     #[error(
         "unknown prediction scheme {prediction} with template {template}; \
          0 is free (template 0), 1 partly predefined, 2 predefined (template 1 to 4)"
@@ -156,10 +157,10 @@ pub enum DecodeError {
         /// The byte for the template.
         template: u8,
     },
-    /// The model does not go with the predictions.
+    /// The model cannot be combined with the predictions.
     #[error(transparent)]
     NoSuchTopology(#[from] TopologyError),
-    /// The numbers of weights are not the topology's, or not those that the length leaves room for.
+    /// The numbers of weights do not match the topology or the length.
     #[error(
         "{action} action and {prediction} prediction weights in {bytes} bytes; the topology has \
          {expected_action} and {expected_prediction} in {}", 2 * (expected_action + expected_prediction)
@@ -179,7 +180,7 @@ pub enum DecodeError {
     /// −32768 is not a weight.
     #[error("weight {index} is −32768; weights are within ±32767")]
     InvalidWeight {
-        /// Place of the weight.
+        /// Index of the weight.
         index: usize,
     },
 }
@@ -194,21 +195,37 @@ pub struct BufferTooSmall {
 }
 
 /// A container that has passed every check; borrows its bytes.
+///
+/// ```
+/// use minimal_surprise_controller::{EncodedGenome, Genome, Provenance, Topology, codec};
+///
+/// let genome = Genome::zeroed(Topology::default());
+/// let mut buffer = [0; codec::CONTAINER_BYTES_MAX];
+/// let container = codec::encode(&genome, Provenance::default(), &mut buffer)?;
+///
+/// let encoded = EncodedGenome::decode(container)?;
+/// assert_eq!(encoded.to_genome(), genome);
+///
+/// let mut damaged = container.to_vec();
+/// damaged[100] ^= 1;
+/// assert!(EncodedGenome::decode(&damaged).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EncodedGenome<'a> {
     topology: Topology,
     provenance: Provenance,
-    /// Little-endian, one a weight.
+    /// Little-endian, one entry per weight.
     weights: &'a [[u8; 2]],
 }
 
 impl<'a> EncodedGenome<'a> {
-    /// Checks everything there is to check.
+    /// Checks every part of a container.
     ///
     /// # Errors
-    /// [`DecodeError`]: the first thing found wrong, in the order magic, version, length, checksum,
-    /// header, kernel, topology, sizes, weights. A number of bytes below [`PREFIX_BYTES`] comes
+    /// [`DecodeError`]: the first error found, in the order magic, version, length, checksum,
+    /// header, kernel, topology, sizes, weights. Fewer than [`PREFIX_BYTES`] bytes are reported
     /// before all others.
     pub fn decode(bytes: &'a [u8]) -> Result<Self, DecodeError> {
         let prefix = Prefix::read(bytes)?;
@@ -270,7 +287,7 @@ impl<'a> EncodedGenome<'a> {
         self.weights.iter().map(|pair| i16::from_le_bytes(*pair))
     }
 
-    /// A copy of the weights in fixed memory.
+    /// Copies the weights into a [`Genome`].
     #[must_use]
     pub fn to_genome(&self) -> Genome {
         Genome::from_iter(self.topology, self.weights())
@@ -318,8 +335,8 @@ pub fn encode<'b>(
     Ok(container)
 }
 
-/// Length of the container that starts with these bytes, from its first [`PREFIX_BYTES`]; at most
-/// [`CONTAINER_BYTES_MAX`].
+/// Returns the length of the container that starts with these bytes, at most
+/// [`CONTAINER_BYTES_MAX`]. The first [`PREFIX_BYTES`] are enough.
 ///
 /// # Errors
 /// [`DecodeError::TooShort`], [`DecodeError::WrongMagic`], [`DecodeError::UnknownVersion`] or
@@ -370,7 +387,7 @@ impl Prefix {
     }
 }
 
-/// Length and checksum; returns what is between the prefix and the checksum.
+/// Checks length and checksum; returns the bytes between the prefix and the checksum.
 fn checked_block(bytes: &[u8], length: usize) -> Result<&[u8], DecodeError> {
     let found = bytes.len();
     if found > length {
@@ -392,8 +409,8 @@ fn checked_block(bytes: &[u8], length: usize) -> Result<&[u8], DecodeError> {
     body.get(PREFIX_BYTES..).ok_or(too_short)
 }
 
-/// postcard accepts more than one spelling of a number, and bytes after the last field. Both only
-/// make the header longer, so that it is the one way to write its fields if it is the shortest.
+/// postcard accepts several encodings of a number, and bytes after the last field. Both only make
+/// the header longer, so a header of minimum length is in its canonical form.
 fn decode_header(bytes: &[u8]) -> Result<Header, DecodeError> {
     match postcard::from_bytes::<Header>(bytes) {
         Ok(header) if header.shortest_bytes() == bytes.len() => Ok(header),
@@ -423,7 +440,7 @@ impl Header {
     }
 }
 
-/// Length of a number written seven bits a byte.
+/// Length of a number encoded with seven bits per byte.
 fn varint_bytes(value: u64) -> usize {
     let bits = u64::BITS - (value | 1).leading_zeros();
     bits.div_ceil(7) as usize
@@ -508,7 +525,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shortest_length_of_a_header_is_that_of_the_header_written() {
+    fn the_shortest_length_of_a_header_is_that_of_the_encoded_header() {
         let ends = [0, 7, 14, 16, 21, 28, 32, 35, 42, 49, 56, 63].map(|bits| 1_u64 << bits);
         for value in ends.into_iter().flat_map(|end| [end - 1, end]) {
             let header = Header {

@@ -7,7 +7,7 @@ use crate::sensor::SensorBits;
 use crate::topology::Topology;
 use serde::{Deserialize, Serialize};
 
-/// What a robot does in a step. There is no stopping.
+/// What a robot does in a step. There is no action for stopping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Action {
@@ -18,7 +18,7 @@ pub enum Action {
     Turn,
 }
 
-/// Which way a robot turns; decided in every step, carried out with [`Action::Turn`].
+/// Which way a robot turns; decided in every step, used only with [`Action::Turn`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Turn {
@@ -42,6 +42,22 @@ pub struct Decision {
 }
 
 /// The two networks of a genome, ready to run. Shared by all robots of a swarm.
+///
+/// ```
+/// use minimal_surprise_controller::{Action, Controller, Genome, SensorBits, State, Topology};
+///
+/// let controller = Controller::new(&Genome::zeroed(Topology::default()));
+/// let mut first = State::new(&controller);
+/// let mut second = State::new(&controller);
+///
+/// let decision = controller.step(&mut first, SensorBits::new(0b1001));
+/// assert_eq!(decision.action, Action::Turn);
+/// controller.step(&mut second, SensorBits::NONE);
+///
+/// // The first readings were two occupied cells, none of them predicted.
+/// assert_eq!(first.surprise().mispredicted_bits, 2);
+/// assert_eq!(second.surprise().mispredicted_bits, 0);
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Controller {
@@ -50,7 +66,7 @@ pub struct Controller {
     prediction: Option<PredictionNetwork>,
 }
 
-/// What one robot remembers from step to step.
+/// The state of one robot between steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct State {
@@ -60,7 +76,7 @@ pub struct State {
     surprise: Surprise,
 }
 
-/// Bits that a robot mispredicted, of all that it sensed.
+/// How many of the bits that a robot sensed were mispredicted.
 ///
 /// One minus their ratio, over all robots, is the fitness of Eq. 1 of the paper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -73,7 +89,7 @@ pub struct Surprise {
 }
 
 impl Surprise {
-    /// Mispredicted share in Q16, 0 (every bit foreseen) to 65,536 (none), rounded down; 0 before
+    /// Mispredicted share in Q16, 0 (every bit predicted) to 65,536 (none), rounded down; 0 before
     /// the first step.
     #[must_use]
     pub fn share_q16(self) -> u32 {
@@ -85,13 +101,13 @@ impl Surprise {
 }
 
 impl Controller {
-    /// Works out everything that a genome settles once and for all.
+    /// Builds the controller of a genome and precomputes everything that is constant.
     #[must_use]
     pub fn new(genome: &Genome) -> Self {
         Self::build(genome.topology(), &mut genome.weights().iter().copied())
     }
 
-    /// [`Controller::new`] straight from a checked container, without a copy of the weights.
+    /// [`Controller::new`] from a decoded container, without copying the weights.
     #[must_use]
     pub fn from_encoded(genome: &EncodedGenome<'_>) -> Self {
         Self::build(genome.topology(), &mut genome.weights())
@@ -110,7 +126,7 @@ impl Controller {
             action: ActionNetwork::zeroed(topology.action_shape()),
             prediction: None,
         };
-        // In place: a network that is returned is copied, and stacks are small.
+        // Built in place: returning a network would copy it, and stacks are small.
         controller.action.read_weights(weights);
         if let Some(shape) = topology.prediction_shape() {
             let network = PredictionNetwork::zeroed(shape);
@@ -119,11 +135,13 @@ impl Controller {
         controller
     }
 
-    /// One control step: scores the last prediction against `sensors`, decides on an action with
-    /// the last one as an input, and predicts the next reading with the action just chosen.
+    /// Runs one control step: scores the last prediction against `sensors`, chooses an action from
+    /// `sensors` and the last action, and predicts the next reading from `sensors` and the new
+    /// action.
     ///
     /// Bits beyond the model's sensors are ignored. Cannot fail, panic or allocate.
-    // One copy, in this crate: a firmware may optimise this crate for speed and the rest for size.
+    // One copy, compiled in this crate: a firmware may optimise this crate for speed and the rest
+    // for size.
     #[cfg_attr(has_smlad, inline(never))]
     #[cfg_attr(not(has_smlad), inline)]
     pub fn step(&self, state: &mut State, sensors: SensorBits) -> Decision {
@@ -156,7 +174,8 @@ impl Controller {
         (action, turn)
     }
 
-    /// The rest of a step, the action being settled: scores the last prediction and makes the next.
+    /// The rest of a step, once the action is chosen: scores the last prediction and makes the
+    /// next.
     #[inline]
     pub fn predict(&self, state: &mut State, sensors: SensorBits, action: Action) -> SensorBits {
         let sensors = SensorBits::new(sensors.bits() & self.topology.model().mask().bits());
@@ -189,7 +208,7 @@ impl Controller {
         self.prediction.as_ref()
     }
 
-    /// Sensor bits with the action value behind them.
+    /// Sensor bits followed by the action value.
     #[inline]
     fn inputs(&self, sensors: SensorBits, action: Action) -> u32 {
         let model = self.topology.model();
@@ -197,7 +216,7 @@ impl Controller {
     }
 }
 
-/// Puts the lowest bits of `bits` where `mask` has ones, in order.
+/// Distributes the lowest bits of `bits` to the positions where `mask` has ones, in order.
 #[inline]
 #[must_use]
 pub fn spread(bits: u16, mask: u16) -> u16 {
@@ -219,8 +238,8 @@ pub fn spread(bits: u16, mask: u16) -> u16 {
 }
 
 impl State {
-    /// A robot at its start: hidden values zero, last action straight, predicting nothing but what
-    /// is fixed.
+    /// The state of a robot before its first step: hidden values zero, last action straight, and
+    /// only the fixed predictions.
     #[must_use]
     pub fn new(controller: &Controller) -> Self {
         Self {
@@ -249,7 +268,7 @@ impl State {
         &self.hidden_q3_12.0
     }
 
-    /// Surprise since the start, the number that a robot reports.
+    /// Surprise since the start, as a robot reports it.
     #[must_use]
     pub fn surprise(&self) -> Surprise {
         self.surprise

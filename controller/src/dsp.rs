@@ -1,11 +1,10 @@
-//! The sums of both layers with SMLAD, two products in one instruction: for chips with Arm's DSP
-//! extension, as Cortex-M4 and M7.
+//! The sums of both layers with SMLAD, two products per instruction, for chips with Arm's DSP
+//! extension such as Cortex-M4 and M7.
 //!
-//! The one module of this crate with `unsafe` code. The compiler's function for this instruction
-//! is not stable, and left to itself the compiler neither finds the instruction nor keeps the terms
-//! in few enough loads: a control step would take more instructions than a robot has to spend
-//! (test `budget`). Sums are exact, so that their order changes nothing: the results are those of
-//! the portable code to the bit (test `parity`).
+//! The only module of this crate with `unsafe` code. The intrinsic for this instruction is not
+//! stable, and without it the compiler neither emits the instruction nor combines the loads of the
+//! terms: a control step would exceed the instruction budget of a robot (test `budget`). Sums are
+//! exact in any order, so the results equal those of the portable code bit for bit (test `parity`).
 #![allow(unsafe_code)]
 
 use crate::activation::{ROWS, SEGMENT_SCALE};
@@ -13,7 +12,8 @@ use crate::fixed::{FRACTION_BITS, MAX_TERMS, ROUNDING_Q24};
 use crate::network::Aligned;
 use core::arch::asm;
 
-/// Makes the first `count` values their activations: [`activate`](crate::activate), in its order.
+/// Replaces the first `count` values with their activations: [`activate`](crate::activate), with
+/// the same order of operations.
 #[inline]
 pub(crate) fn activate_all<const N: usize>(values: &mut [i16; N], count: usize) {
     const { assert!(SEGMENT_SCALE == 15 << 1) };
@@ -21,9 +21,9 @@ pub(crate) fn activate_all<const N: usize>(values: &mut [i16; N], count: usize) 
     if count == 0 {
         return;
     }
-    // SAFETY: reads and writes `count` values, no more than there are, and reads one of the 32 rows
-    // of `ROWS` for each; an `i32` starts at a word, as `ldm` wants it. The flags and the registers
-    // used are declared.
+    // SAFETY: reads and writes `count` values, no more than exist, and reads one of the 32 rows of
+    // `ROWS` for each; an `i32` is word-aligned, as `ldm` requires. The flags and registers used
+    // are declared.
     unsafe {
         asm!(
             "2:",
@@ -56,12 +56,12 @@ pub(crate) fn activate_all<const N: usize>(values: &mut [i16; N], count: usize) 
     }
 }
 
-/// Terms of the sums that [`output_signs`] makes.
+/// Number of terms in each sum of [`output_signs`].
 pub(crate) const OUTPUT_TERMS: usize = 14;
 
-/// The hidden layer before its activation: for each of the first `count` rows the Q3.12 sum of its
-/// products with `terms`, whose last one is replaced by the row's place in `values`. The sum takes
-/// that place.
+/// The hidden layer before activation: for each of the first `count` rows, computes the Q3.12 sum
+/// of its products with `terms`, with the row's entry of `values` as the last term, and stores the
+/// sum in that entry.
 #[inline]
 pub(crate) fn hidden_sums<const N: usize>(
     rows: &Aligned<[[i16; MAX_TERMS]; N]>,
@@ -73,9 +73,9 @@ pub(crate) fn hidden_sums<const N: usize>(
     if count == 0 {
         return;
     }
-    // SAFETY: reads `count` rows of eight words, `count` times the eight words of `terms`, and reads
-    // and writes `count` values; no more than there are. All start at words, as
-    // `ldm` wants it. The flags and the registers used are declared.
+    // SAFETY: reads `count` rows of eight words, `count` times the eight words of `terms`, and
+    // reads and writes `count` values; no more than exist. All are word-aligned, as `ldm` requires.
+    // The flags and registers used are declared.
     unsafe {
         asm!(
             "2:",
@@ -119,11 +119,11 @@ pub(crate) fn hidden_sums<const N: usize>(
     }
 }
 
-/// The signs of an output layer: bit k is set where the sum of row k's products with `terms` is not
+/// The signs of an output layer: bit k is set if the sum of row k's products with `terms` is not
 /// negative, for the first `count` rows.
 ///
 /// # Panics
-/// Unless a row has [`OUTPUT_TERMS`] terms; known when this is compiled.
+/// If a row does not have [`OUTPUT_TERMS`] terms; decided at compile time.
 #[inline]
 pub(crate) fn output_signs<const N: usize, const O: usize>(
     rows: &Aligned<[[i16; N]; O]>,
@@ -137,8 +137,8 @@ pub(crate) fn output_signs<const N: usize, const O: usize>(
     }
     let negative: u32;
     // SAFETY: reads `count` rows of seven words and `count` times the seven words of `terms`; no
-    // more than there are. All start at words, as `ldm` wants it. The flags and the registers used
-    // are declared.
+    // more than exist. All are word-aligned, as `ldm` requires. The flags and registers used are
+    // declared.
     unsafe {
         asm!(
             "2:",
@@ -155,7 +155,8 @@ pub(crate) fn output_signs<const N: usize, const O: usize>(
             "ldr r4, [{row}], #4",
             "smlad {sum}, r2, r4, {sum}",
             "subs {terms}, #16",
-            // The sign goes through the carry to the lower end; the first row's ends up highest.
+            // The sign is shifted through the carry into the lowest bit; the first row's ends up
+            // highest.
             "lsls {sum}, {sum}, #1",
             "adcs {negative}, {negative}, {negative}",
             "subs {count}, #1",
@@ -178,13 +179,13 @@ pub(crate) fn output_signs<const N: usize, const O: usize>(
     ((!negative).reverse_bits() >> (32 - count as u32)) as u16
 }
 
-/// Terms of the sums that [`action_signs`] makes.
+/// Number of terms in each sum of [`action_signs`].
 pub(crate) const ACTION_TERMS: usize = 8;
 
 /// [`output_signs`] for rows of [`ACTION_TERMS`] terms, which stay in registers.
 ///
 /// # Panics
-/// Unless a row has as many; known when this is compiled.
+/// If a row does not have that many terms; decided at compile time.
 #[inline]
 pub(crate) fn action_signs<const N: usize, const O: usize>(
     rows: &Aligned<[[i16; N]; O]>,
@@ -197,8 +198,8 @@ pub(crate) fn action_signs<const N: usize, const O: usize>(
         return 0;
     }
     let negative: u32;
-    // SAFETY: reads `count` rows of four words and the four words of `terms`; no more than there
-    // are. All start at words, as `ldm` wants it. The flags and the registers used are declared.
+    // SAFETY: reads `count` rows of four words and the four words of `terms`; no more than exist.
+    // All are word-aligned, as `ldm` requires. The flags and registers used are declared.
     unsafe {
         asm!(
             "ldm r0, {{r0, r1, r2, r3}}",
@@ -230,7 +231,7 @@ pub(crate) fn action_signs<const N: usize, const O: usize>(
     ((!negative).reverse_bits() >> (32 - count as u32)) as u16
 }
 
-/// Makes every pair of terms that of its two bits of `inputs`.
+/// Selects every pair of terms by its two bits of `inputs`.
 #[inline]
 pub(crate) fn select_terms(
     pairs: &Aligned<[[[i16; 2]; 4]; MAX_TERMS / 2]>,
@@ -238,7 +239,7 @@ pub(crate) fn select_terms(
     terms: &mut Aligned<[i16; MAX_TERMS]>,
 ) {
     // SAFETY: reads one of the four words of each of the eight tables, and writes the eight words
-    // of `terms`. The flags and the registers used are declared.
+    // of `terms`. The flags and registers used are declared.
     unsafe {
         asm!(
             ".rept {words}",

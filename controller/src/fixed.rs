@@ -1,7 +1,7 @@
-//! Q3.12 fixed point: the one number format of weights, thresholds and activations.
+//! Q3.12 fixed point: the number format of all weights, thresholds and activations.
 //!
 //! A value `v` stands for `v / 4096`. A product of two values is Q24 in `i32`; sums of up to
-//! [`MAX_TERMS`] products are exact, whatever their order.
+//! [`MAX_TERMS`] products are exact in any order.
 
 /// 1.0 in Q3.12.
 pub const ONE_Q3_12: i16 = 4096;
@@ -12,13 +12,13 @@ pub const FRACTION_BITS: u32 = 12;
 /// Largest weight, in Q3.12; the smallest is its negative. −32768 is not a weight.
 pub const WEIGHT_MAX_Q3_12: i16 = 32767;
 
-/// Most terms of one sum: 15 inputs and a self-loop.
+/// Maximum number of terms in a sum: 15 inputs and a self-loop.
 ///
 /// Activations stay within ±4096 and weights within ±32767, so
 /// 16 · 4096 · 32767 + 2048 < 2³¹: a sum cannot overflow.
 pub const MAX_TERMS: usize = 16;
 
-/// What an accumulator starts from, so that the shift in [`sum_to_q3_12`] rounds to nearest.
+/// Initial value of an accumulator, so that the shift in [`sum_to_q3_12`] rounds to nearest.
 pub const ROUNDING_Q24: i32 = 1 << (FRACTION_BITS - 1);
 
 const _: () = assert!(
@@ -39,8 +39,8 @@ pub const fn saturate(value: i32) -> i16 {
     }
 }
 
-/// A Q24 sum that started from [`ROUNDING_Q24`], as Q3.12: arithmetic shift right by 12, then
-/// saturation to `i16` (one `ssat` on a Cortex-M4).
+/// Converts a Q24 sum that started from [`ROUNDING_Q24`] to Q3.12: arithmetic shift right by 12,
+/// then saturation to `i16` (one `ssat` on a Cortex-M4).
 #[inline]
 #[must_use]
 pub const fn sum_to_q3_12(sum_q24: i32) -> i16 {

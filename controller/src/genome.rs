@@ -1,22 +1,35 @@
 //! Genomes: the weights of both networks, and the operators of evolution.
 //!
-//! The operators take any [`rand_core::Rng`], so that a robot can evolve with the host's
-//! operators. Given the same generator state they give the same genome on every machine.
+//! The operators take any [`rand_core::Rng`], so a robot can use the same operators as the host.
+//! The same generator state yields the same genome on every machine.
 
 use crate::fixed::WEIGHT_MAX_Q3_12;
 use crate::topology::{MAX_WEIGHTS, Topology};
 use rand_core::Rng;
 
-/// Initial weights are uniform in ± this (0.5 in Q3.12), ends included.
+/// Initial weights are uniform within ± this value (0.5 in Q3.12), inclusive.
 pub const INITIAL_WEIGHT_MAX_Q3_12: i16 = 2048;
 
-/// Mutation adds a value uniform in ± this (0.4 in Q3.12), ends included.
+/// Mutation adds a value uniform within ± this value (0.4 in Q3.12), inclusive.
 pub const MUTATION_MAX_Q3_12: i16 = 1638;
 
 /// The weights of an action network and, unless all predictions are fixed, a prediction network.
 ///
-/// Fixed memory, room for any topology. Weights are Q3.12 within ±32767, in the order described
-/// in [`network`](crate::network): the action network's, then the prediction network's.
+/// Fixed size, large enough for any topology. Weights are Q3.12 within ±32767, in the order
+/// described in [`network`](crate::network): the action network's, then the prediction network's.
+///
+/// ```
+/// use minimal_surprise_controller::{Genome, MutationRate, Topology};
+/// use rand_chacha::ChaCha8Rng;
+/// use rand_core::SeedableRng;
+///
+/// let mut rng = ChaCha8Rng::seed_from_u64(1);
+/// let parent = Genome::random(Topology::default(), &mut rng);
+/// let mut child = parent.clone();
+/// child.mutate(MutationRate::ratio(1, 10).expect("at most 1"), &mut rng);
+/// assert_ne!(child, parent);
+/// assert_eq!(child.weights().len(), 616);
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Genome {
@@ -24,11 +37,12 @@ pub struct Genome {
     weights: [i16; MAX_WEIGHTS],
 }
 
-/// These weights are not a genome.
+/// The weights do not form a genome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum GenomeError {
-    /// The number of weights is not the topology's.
+    /// The number of weights does not match the topology.
     #[error("{found} weights; the topology has {expected}")]
     WrongCount {
         /// Weights given.
@@ -39,7 +53,7 @@ pub enum GenomeError {
     /// −32768 is not a weight.
     #[error("weight {index} is −32768; weights are within ±32767")]
     InvalidWeight {
-        /// Place of the weight.
+        /// Index of the weight.
         index: usize,
     },
 }
@@ -57,7 +71,7 @@ impl Genome {
     /// From weights in genome order.
     ///
     /// # Errors
-    /// [`GenomeError`] if their number is not the topology's or one of them is −32768.
+    /// [`GenomeError`] if their number does not match the topology or one of them is −32768.
     pub fn from_weights(topology: Topology, weights: &[i16]) -> Result<Self, GenomeError> {
         if weights.len() != topology.weights() {
             return Err(GenomeError::WrongCount {
@@ -71,7 +85,7 @@ impl Genome {
         Ok(Self::from_iter(topology, weights.iter().copied()))
     }
 
-    /// From weights that are known to be valid and as many as the topology has.
+    /// From valid weights whose number matches the topology.
     pub(crate) fn from_iter(topology: Topology, weights: impl Iterator<Item = i16>) -> Self {
         let mut genome = Self::zeroed(topology);
         for (to, from) in genome.weights_mut().zip(weights) {
@@ -90,7 +104,7 @@ impl Genome {
         genome
     }
 
-    /// Each weight independently, with the given rate, gets an addend uniform within
+    /// Mutates each weight independently, with the given rate, by adding a value uniform within
     /// ±[`MUTATION_MAX_Q3_12`]; the result saturates at ±32767.
     pub fn mutate<R: Rng>(&mut self, rate: MutationRate, rng: &mut R) {
         for weight in self.weights_mut() {
@@ -143,8 +157,8 @@ pub struct MutationRate {
 }
 
 impl MutationRate {
-    /// `numerator / denominator`, rounded down to a multiple of 2⁻³²; `None` beyond 1 or without a
-    /// denominator.
+    /// `numerator / denominator`, rounded down to a multiple of 2⁻³²; `None` above 1 or if the
+    /// denominator is 0.
     #[must_use]
     pub const fn ratio(numerator: u32, denominator: u32) -> Option<Self> {
         if denominator == 0 || numerator > denominator {
@@ -156,7 +170,7 @@ impl MutationRate {
         }
     }
 
-    /// `threshold / 2³²`; `None` beyond 1.
+    /// `threshold / 2³²`; `None` above 1.
     #[must_use]
     pub const fn from_per_2_32(threshold: u64) -> Option<Self> {
         if threshold > 1 << 32 {
@@ -169,8 +183,8 @@ impl MutationRate {
     }
 }
 
-/// Uniform in `-max..=max`: one word a draw, times the number of values, the upper half taken and
-/// the few words that would favour a value rejected (Lemire's method).
+/// Uniform in `-max..=max` (Lemire's method): multiplies one word per draw by the number of values,
+/// takes the upper half, and rejects the few words that would bias the result.
 fn uniform_within<R: Rng>(rng: &mut R, max: i16) -> i16 {
     let values = 2 * max.unsigned_abs() as u32 + 1;
     let rejected_below = values.wrapping_neg() % values;
@@ -235,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn mutation_changes_the_asked_share_and_saturates() {
+    fn mutation_changes_the_given_share_and_saturates() {
         let topology = Topology::default();
         let rate = MutationRate::ratio(3, 10).unwrap();
         let mut rng = rng();
@@ -269,7 +283,7 @@ mod tests {
         assert_eq!(MutationRate::from_per_2_32((1 << 32) + 1), None);
     }
 
-    /// Gives these words, in order.
+    /// Returns the given words in order.
     struct Script<I>(I);
 
     impl<I: Iterator<Item = u32>> TryRng for Script<I> {
@@ -289,8 +303,8 @@ mod tests {
     }
 
     #[test]
-    fn every_value_has_as_many_words_and_the_others_are_rejected() {
-        // 2³² words for 3 values: one is too many, and it is the first.
+    fn every_value_has_equally_many_words_and_surplus_words_are_rejected() {
+        // 2³² words for 3 values: the first word is surplus.
         let draw = |words: &[u32]| {
             let mut script = Script(words.iter().copied());
             let value = uniform_within(&mut script, 1);
@@ -305,8 +319,8 @@ mod tests {
         assert_eq!(draw(&[0xaaaa_aaab]), 1);
         assert_eq!(draw(&[u32::MAX]), 1);
 
-        // 2³² is 256 modulo 4097: words are rejected whose product with 4097 ends in less. The
-        // factor is the inverse of 4097 modulo 2³².
+        // 2³² modulo 4097 is 256: a word is rejected if the lower half of its product with 4097 is
+        // less. The factor is the inverse of 4097 modulo 2³².
         let of_4097 = |low: u32| low.wrapping_mul(0x00ff_f001);
         for low in [0, 1, 255] {
             assert_eq!(of_4097(low).wrapping_mul(4097), low);

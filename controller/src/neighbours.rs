@@ -1,13 +1,13 @@
-//! From detected neighbours to sensor bits, for robots that measure range and bearing.
+//! Converts detected neighbours to sensor bits, for robots that measure range and bearing.
 //!
-//! The robot stands in the middle of its own cell, facing ahead; a neighbour at range r and
-//! bearing b is `r·cos b` ahead and `r·sin b` to the left. With a cell size s, the cell in
-//! direction v is `⌊v / s + ½⌋`: a neighbour exactly on a border belongs to the cell further
-//! ahead, or further left. Trigonometry is `micromath`'s, off by at most 0.002 of the range
-//! (`encoding_error_max_bearings`), so a neighbour that close to a border may fall on either side
-//! of it. This is the only floating point on a robot, and it ends at the sensor bits.
+//! The robot stands in the middle of its own cell, facing ahead; a neighbour at range r and bearing
+//! b is `r·cos b` ahead and `r·sin b` to the left. With a cell size s, the cell in direction v is
+//! `⌊v / s + ½⌋`: a neighbour exactly on a border belongs to the cell further ahead, or further
+//! left. Trigonometry comes from `micromath`, with an error of at most 0.002 of the range
+//! (`encoding_error_max_bearings`), so a neighbour that close to a border may be assigned to either
+//! side. This is the only floating point on a robot, and it ends at the sensor bits.
 //!
-//! | detection | what becomes of it |
+//! | detection | result |
 //! |---|---|
 //! | range 0, or within the robot's own cell | ignored |
 //! | range or bearing not a number or infinite, range negative | refused by [`Neighbours::push`], counted in [`Neighbours::refused`] |
@@ -78,7 +78,7 @@ impl<const N: usize> Neighbours<N> {
         }
     }
 
-    /// Adds a detection. If there is no room the farthest one, this one included, is dropped.
+    /// Adds a detection. If the list is full, drops the farthest detection, which may be this one.
     pub fn push(&mut self, detection: Detection) {
         let Detection {
             range_mm,
@@ -103,7 +103,7 @@ impl<const N: usize> Neighbours<N> {
         }
     }
 
-    /// Forgets all detections, for the next control step; the counts stay.
+    /// Removes all detections before the next control step; keeps the counts.
     pub fn clear(&mut self) {
         self.detections.clear();
     }
@@ -120,7 +120,7 @@ impl<const N: usize> Neighbours<N> {
         self.refused
     }
 
-    /// Detections dropped so far for want of room.
+    /// Detections dropped so far because the list was full.
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.dropped
@@ -144,7 +144,7 @@ impl<const N: usize> Neighbours<N> {
     }
 }
 
-/// Cells ahead and to the left of the robot; far away, a cell beyond every model's.
+/// Cells ahead and to the left of the robot; for distant neighbours, a cell outside every model.
 fn cell_of(detection: Detection, cell: CellSize) -> (i32, i32) {
     let bearing = F32(detection.bearing_rad % core::f32::consts::TAU);
     let cells = F32(detection.range_mm / cell.mm);
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn zero_range_the_own_cell_and_beyond_reach_set_nothing() {
+    fn detections_at_range_zero_in_the_robots_cell_and_out_of_reach_set_no_bit() {
         let all = [
             (0.0, 1.0),
             (49.0, PI),
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn of_neighbours_equally_far_the_one_detected_first_is_kept() {
+    fn of_equally_distant_neighbours_the_one_detected_first_is_kept() {
         let mut neighbours = Neighbours::<1>::new();
         for bearing_rad in [1.0, 2.0] {
             neighbours.push(Detection {

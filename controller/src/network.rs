@@ -2,7 +2,8 @@
 //!
 //! With `act` = [`activate`] and all values in Q3.12:
 //!
-//! - input neuron j: `u_j = act(w_j · x_j − θ_j)`, x_j a bit. It has two values, worked out once;
+//! - input neuron j: `u_j = act(w_j · x_j − θ_j)`, x_j a bit. Its two possible values are
+//!   precomputed;
 //! - hidden neuron i: `h_i = act(Σ_j W_ij · u_j + r_i · h_i(t−1))`, the last term in the
 //!   prediction network only (paper, Fig. 1b);
 //! - output neuron k: the sign of the exact sum `Σ_i V_ki · h_i`.
@@ -15,13 +16,13 @@ use crate::fixed::{FRACTION_BITS, MAX_TERMS, ONE_Q3_12, saturate};
 #[cfg(not(has_smlad))]
 use crate::fixed::{ROUNDING_Q24, sum_to_q3_12};
 
-/// Most inputs of a network: 14 sensors and the action value.
+/// Maximum number of inputs of a network: 14 sensors and the action value.
 pub const MAX_INPUTS: usize = 15;
-/// Most hidden neurons of a network.
+/// Maximum number of hidden neurons of a network.
 pub const MAX_HIDDEN: usize = 14;
-/// Most outputs of a network.
+/// Maximum number of outputs of a network.
 pub const MAX_OUTPUTS: usize = 14;
-/// Place of the self-loop among a hidden neuron's terms.
+/// Index of the self-loop among a hidden neuron's terms.
 pub const SELF_LOOP: usize = MAX_TERMS - 1;
 
 /// Sizes of a network. The last input is the action value.
@@ -37,6 +38,7 @@ pub struct Shape {
 /// A network of these sizes cannot be built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum ShapeError {
     /// A sum would have more terms than are exact in `i32`.
     #[error("a sum of {terms} terms; at most {MAX_TERMS} are exact")]
@@ -44,7 +46,7 @@ pub enum ShapeError {
         /// Terms of the longest sum.
         terms: usize,
     },
-    /// A layer is empty, or larger than the memory set aside for it.
+    /// A layer is empty, or exceeds the memory reserved for it.
     #[error(
         "{inputs}-{hidden}-{outputs} does not fit 1..={MAX_INPUTS} inputs, \
          1..={MAX_HIDDEN} hidden and 1..={MAX_OUTPUTS} output neurons"
@@ -100,7 +102,7 @@ impl Shape {
         })
     }
 
-    /// [`Shape::new`] for constants: a shape that cannot be built does not compile.
+    /// [`Shape::new`] for constants: an invalid shape does not compile.
     pub(crate) const fn checked(
         inputs: usize,
         hidden: usize,
@@ -150,20 +152,20 @@ impl Shape {
     }
 }
 
-/// A network with room for `H` hidden neurons and `O` outputs; what the shape does not use is zero
-/// and adds nothing.
+/// A network with room for `H` hidden neurons and `O` outputs; entries beyond the shape are zero
+/// and add nothing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Network<const H: usize, const O: usize> {
     shape: Shape,
     /// Activations of two input neurons at a time, for each value of their two bits.
     input: Aligned<[[[i16; 2]; 4]; MAX_TERMS / 2]>,
-    /// Inputs' weights from 0 on, the self-loop at [`SELF_LOOP`].
+    /// The inputs' weights, starting at 0, and the self-loop at [`SELF_LOOP`].
     hidden: Aligned<[[i16; MAX_TERMS]; H]>,
     output: Aligned<[[i16; H]; O]>,
 }
 
-/// Starts at a word: several weights can be loaded at a time.
+/// Word-aligned, so that several weights can be loaded at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C, align(4))]
@@ -177,7 +179,7 @@ pub type PredictionNetwork = Network<MAX_HIDDEN, MAX_OUTPUTS>;
 impl<const H: usize, const O: usize> Network<H, O> {
     const TERMS_ARE_EXACT: () = assert!(H <= MAX_TERMS && O <= 16, "more than 16 terms in a sum");
 
-    /// A network all of whose rows are zero.
+    /// A network with all rows zero.
     #[inline]
     pub(crate) const fn zeroed(shape: Shape) -> Self {
         let () = Self::TERMS_ARE_EXACT;
@@ -189,9 +191,9 @@ impl<const H: usize, const O: usize> Network<H, O> {
         }
     }
 
-    /// Takes the shape's weights, in genome order, from `weights`; weights that it does not
-    /// deliver are zero, those beyond the shape stay in it. Neurons beyond `H` and `O` are left
-    /// out. The network must have been zero.
+    /// Reads the shape's weights, in genome order, from `weights`. Missing weights are zero;
+    /// surplus weights stay in the iterator. Neurons beyond `H` and `O` are skipped. All rows must
+    /// be zero before the call.
     pub(crate) fn read_weights(&mut self, weights: &mut dyn Iterator<Item = i16>) {
         read_weights(
             self.shape,
@@ -218,22 +220,22 @@ impl<const H: usize, const O: usize> Network<H, O> {
         })
     }
 
-    /// Hidden weights (Q3.12): a row a neuron, the self-loop at [`SELF_LOOP`]; zero beyond the
+    /// Hidden weights (Q3.12): one row per neuron, the self-loop at [`SELF_LOOP`]; zero beyond the
     /// shape.
     #[must_use]
     pub fn hidden_rows(&self) -> &[[i16; MAX_TERMS]; H] {
         &self.hidden.0
     }
 
-    /// Output weights (Q3.12): a row an output; zero beyond the shape.
+    /// Output weights (Q3.12): one row per output; zero beyond the shape.
     #[must_use]
     pub fn output_rows(&self) -> &[[i16; H]; O] {
         &self.output.0
     }
 
-    /// One forward pass: bit j of `inputs` is input j, bit k of the result is set where output k
+    /// Runs one forward pass: bit j of `inputs` is input j; bit k of the result is set if output k
     /// is not negative. `hidden` holds the last hidden activations and receives the new ones;
-    /// without self-loops only the latter.
+    /// without self-loops the last ones are not used.
     #[inline]
     pub(crate) fn forward(&self, inputs: u32, hidden: &mut Aligned<[i16; H]>) -> u16 {
         let mut terms = Aligned([0; MAX_TERMS]);
@@ -245,8 +247,8 @@ impl<const H: usize, const O: usize> Network<H, O> {
     }
 }
 
-/// Fills the layers of a network, of whatever size: a robot's flash holds this once. An output row
-/// has `output_row` weights.
+/// Fills the layers of a network of any size; not generic, so a robot's flash holds one copy. An
+/// output row has `output_row` weights.
 #[inline(never)]
 fn read_weights(
     shape: Shape,
@@ -284,7 +286,7 @@ fn read_weights(
     }
 }
 
-/// Makes every pair of terms that of its two bits of `inputs`.
+/// Selects every pair of terms by its two bits of `inputs`.
 #[cfg(not(has_smlad))]
 #[inline]
 fn select_terms(
@@ -299,8 +301,8 @@ fn select_terms(
     }
 }
 
-/// Makes the first `count` values the Q3.12 sums of their rows' products with `terms`, of which
-/// each value is the last one.
+/// Replaces each of the first `count` values with the Q3.12 sum of its row's products with `terms`,
+/// the value itself being the last term.
 #[cfg(not(has_smlad))]
 #[inline]
 fn hidden_sums<const H: usize>(
@@ -315,7 +317,7 @@ fn hidden_sums<const H: usize>(
     }
 }
 
-/// Makes the first `count` values their activations.
+/// Replaces the first `count` values with their activations.
 #[cfg(not(has_smlad))]
 #[inline]
 fn activate_all<const H: usize>(values: &mut [i16; H], count: usize) {
@@ -327,7 +329,7 @@ fn activate_all<const H: usize>(values: &mut [i16; H], count: usize) {
 #[cfg(has_smlad)]
 use crate::dsp::{activate_all, hidden_sums, select_terms};
 
-/// Sets bit k where the sum of row k's products with `terms` is not negative, for the first `count`
+/// Sets bit k if the sum of row k's products with `terms` is not negative, for the first `count`
 /// rows.
 #[inline]
 fn output_signs<const H: usize, const O: usize>(
@@ -350,8 +352,8 @@ fn output_signs<const H: usize, const O: usize>(
     outputs
 }
 
-/// Exact sum of products, Q24. Callers have at most [`MAX_TERMS`] terms, one factor of each within
-/// ±[`ONE_Q3_12`].
+/// Exact sum of products, Q24. Callers pass at most [`MAX_TERMS`] terms, with one factor of each
+/// within ±[`ONE_Q3_12`].
 #[inline]
 fn dot<const N: usize>(weights: &[i16; N], values: &[i16; N]) -> i32 {
     let mut sum = 0;
@@ -398,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pass_worked_out_by_hand() {
+    fn a_forward_pass_matches_one_computed_by_hand() {
         // One input (w = 1, θ = 0.5), one hidden neuron (W = 2, r = −1), one output (V = 1).
         let shape = Shape::new(1, 1, 1, true).unwrap();
         let mut weights = [4096, 2048, 8192, -4096, 4096].into_iter();

@@ -1,10 +1,10 @@
-//! Sensor models: which cells around a robot it senses, one bit a cell.
+//! Sensor models: the cells around a robot that it senses, one bit per cell.
 //!
-//! [`SensorModel::cells`] is the one definition of the cells, for the simulator and the robot.
+//! [`SensorModel::cells`] defines the cells for both the simulator and the robot.
 
 use serde::{Deserialize, Serialize};
 
-/// Most sensors of any model (C).
+/// Maximum number of sensors of a model (C).
 pub const MAX_SENSORS: usize = 14;
 
 /// A cell relative to a robot: steps ahead (negative: behind) and to the left (negative: right).
@@ -85,14 +85,14 @@ impl SensorModel {
         self.cells().len()
     }
 
-    /// A one in the place of every sensor of the model.
+    /// A mask with one bit set for every sensor of the model.
     #[must_use]
     pub const fn mask(self) -> SensorBits {
         SensorBits((1 << self.sensors()) - 1)
     }
 }
 
-/// One bit a sensor: bit k is sensor k, 1 means occupied.
+/// One bit per sensor: bit k is sensor k; 1 means occupied.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SensorBits(u16);
@@ -101,7 +101,7 @@ impl SensorBits {
     /// No sensor reads occupied.
     pub const NONE: Self = Self(0);
 
-    /// From the raw bits. Bits beyond a model's sensors are ignored by the controller.
+    /// From raw bits. The controller ignores bits beyond the model's sensors.
     #[must_use]
     pub const fn new(bits: u16) -> Self {
         Self(bits)

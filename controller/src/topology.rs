@@ -1,10 +1,10 @@
-//! Topologies: which networks a genome describes, and which predictions it leaves to them.
+//! Topologies: which networks a genome describes, and which predictions they make.
 
 use crate::network::Shape;
 use crate::sensor::{SensorBits, SensorModel};
 use serde::{Deserialize, Serialize};
 
-/// Structure whose local picture serves as a predefined prediction (paper, Sec. 3.3).
+/// Structure whose local pattern serves as a predefined prediction (paper, Sec. 3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Template {
@@ -56,7 +56,7 @@ impl Template {
 /// The line sensors of model C.
 const LINE_C: u16 = bits_at(&[0, 3, 8, 11]);
 
-/// A word with ones at the given sensors.
+/// A word with the bits of the given sensors set.
 const fn bits_at(sensors: &[u8]) -> u16 {
     let mut bits = 0;
     let mut index = 0;
@@ -67,21 +67,21 @@ const fn bits_at(sensors: &[u8]) -> u16 {
     bits
 }
 
-/// Which predictions are the network's, and which are fixed in advance.
+/// Which predictions the network makes, and which are fixed in advance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Prediction {
     /// The network predicts every sensor.
     #[default]
     Free,
-    /// The sensors that the template sets are always predicted occupied, the network predicts the
-    /// others. Exists for the line on model C.
+    /// The sensors that the template sets are always predicted occupied; the network predicts the
+    /// others. Available only for the line on model C.
     PartlyPredefined(Template),
     /// Every sensor is always predicted as the template says; there is no prediction network.
     Predefined(Template),
 }
 
-/// A combination of sensor model and predictions that exists.
+/// A valid combination of sensor model and predictions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Topology {
@@ -89,9 +89,10 @@ pub struct Topology {
     prediction: Prediction,
 }
 
-/// The combination of sensor model and template does not exist.
+/// The sensor model and the template cannot be combined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum TopologyError {
     /// Squares and triangular lattices need model C.
     #[error("the template {} does not exist for sensor model {model:?}, only for C", template.name())]
@@ -101,7 +102,7 @@ pub enum TopologyError {
         /// The sensor model asked for.
         model: SensorModel,
     },
-    /// Partly predefined predictions exist for the line on model C.
+    /// Partly predefined predictions exist only for the line on model C.
     #[error("partly predefined predictions exist for the line on sensor model C only, not for the {} on {model:?}", template.name())]
     NotPartly {
         /// The template asked for.
@@ -112,7 +113,7 @@ pub enum TopologyError {
 }
 
 impl Topology {
-    /// Every topology that exists.
+    /// Every valid topology.
     pub const ALL: [Self; 12] = {
         use Prediction::{Free, PartlyPredefined, Predefined};
         use SensorModel::{A, B, C};
@@ -136,10 +137,10 @@ impl Topology {
         ]
     };
 
-    /// Checks that the combination exists.
+    /// Creates a topology if the combination is valid.
     ///
     /// # Errors
-    /// [`TopologyError`] names the template and the model that do not go together.
+    /// [`TopologyError`] names the template and the model that cannot be combined.
     pub const fn new(model: SensorModel, prediction: Prediction) -> Result<Self, TopologyError> {
         match prediction {
             Prediction::PartlyPredefined(template)
@@ -172,7 +173,7 @@ impl Topology {
         self.model.sensors()
     }
 
-    /// A one for every sensor that the prediction network predicts.
+    /// A mask with one bit set for every sensor that the prediction network predicts.
     #[must_use]
     pub const fn predicted(self) -> SensorBits {
         let all = self.model.mask().bits();
@@ -183,8 +184,7 @@ impl Topology {
         })
     }
 
-    /// The fixed predictions, zero where there is none; what a robot predicts for its first
-    /// reading.
+    /// The fixed predictions, zero elsewhere; also the prediction for a robot's first reading.
     #[must_use]
     pub const fn fixed(self) -> SensorBits {
         match self.prediction {
@@ -244,7 +244,8 @@ impl Topology {
     }
 }
 
-/// Most weights of any genome: 166 of the action network and 450 of the prediction network.
+/// Maximum number of weights of a genome: 166 of the action network and 450 of the prediction
+/// network.
 pub const MAX_WEIGHTS: usize = {
     let mut most = 0;
     let mut index = 0;
@@ -265,7 +266,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_combination_either_exists_and_is_listed_or_is_refused() {
+    fn every_combination_is_either_valid_and_listed_or_refused() {
         let mut accepted = 0;
         for model in SensorModel::ALL {
             let predictions = Template::ALL

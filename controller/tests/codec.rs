@@ -1,8 +1,8 @@
-//! The genome container (`docs/genome-format.md`): what is written is read again, everything else
-//! is refused, and nothing panics.
+//! The genome container (`docs/genome-format.md`): what is written can be read back, everything
+//! else is refused, and nothing panics.
 //!
-//! Containers are also put together here, field by field and without the crate's own writer, so
-//! that the checksum and the lengths can be right where something behind them is wrong.
+//! Containers are also assembled here field by field, without the crate's writer, so that checksum
+//! and lengths can be right although a later check must fail.
 
 use minimal_surprise_controller::codec::{
     BufferTooSmall, CONTAINER_BYTES_MAX, CRC_32C, HEADER_BYTES_MAX, container_length, encode,
@@ -24,7 +24,7 @@ const SEED: u64 = 2020;
 const PREFIX_BYTES: usize = 8;
 const CRC_BYTES: usize = 4;
 
-/// A container as its fields, each of which may be wrong.
+/// The fields of a container, each of which may be wrong.
 #[derive(Clone, Debug)]
 struct Fields {
     kernel: [u8; 8],
@@ -40,7 +40,7 @@ struct Fields {
     weights: Vec<i16>,
 }
 
-/// Seven bits a byte, the lowest first; all bytes but the last with the highest bit set.
+/// Seven bits per byte, the lowest first; all bytes but the last with the highest bit set.
 fn varint(mut value: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
     while value >= 128 {
@@ -107,7 +107,7 @@ impl Fields {
     }
 }
 
-/// Any header and any weight bytes, with the lengths and the checksum that fit.
+/// A container of any header and weight bytes, with matching lengths and checksum.
 fn container(header: &[u8], weights: &[u8]) -> Vec<u8> {
     let mut bytes = b"MSGE\x01\0\0\0".to_vec();
     bytes[5] = header.len() as u8;
@@ -270,7 +270,7 @@ fn every_appended_byte_is_refused_as_trailing() {
             refused(&[&bytes[..], &[byte]].concat());
         }
         refused(&[&bytes[..], &bytes[..]].concat());
-        // More than a length of 16 bits can tell.
+        // More than a 16-bit length can express.
         refused(&[&bytes[..], &[0; 1 << 16]].concat());
     }
 }
@@ -291,7 +291,7 @@ fn every_single_bit_flip_is_refused() {
     println!("{cases} bit flips");
 }
 
-/// Either an error, or the only bytes that hold what was read.
+/// Decoding fails, or the bytes are the only encoding of what was read.
 fn refused_or_the_only_encoding(bytes: &[u8]) -> Result<(), TestCaseError> {
     if let Ok(read) = decode(bytes) {
         let genome = read.to_genome();
@@ -311,12 +311,12 @@ fn config(cases: u32) -> ProptestConfig {
     }
 }
 
-/// Values in which the fields differ from one another, and others.
+/// Values that distinguish the fields, and arbitrary ones.
 fn byte() -> impl Strategy<Value = u8> {
     prop_oneof![any::<u8>(), 0_u8..6, Just(0x7f), Just(0x80), Just(0xff)]
 }
 
-/// Bytes of a number, shortest or not, of a good size or not.
+/// Bytes of a number, in shortest form or not, of a valid size or not.
 fn loose_varint() -> impl Strategy<Value = Vec<u8>> {
     (any::<u64>(), 0_u32..64, 0_usize..3, byte()).prop_map(|(value, shift, padding, last)| {
         let mut bytes = varint(value >> shift);
@@ -360,7 +360,7 @@ proptest! {
     }
 
     #[test]
-    fn bytes_put_in_and_taken_out_with_repaired_lengths_are_refused_or_the_only_encoding(
+    fn inserted_and_removed_bytes_with_repaired_lengths_are_refused_or_the_only_encoding(
         valid in select(containers()),
         taken_out in vec(any::<Index>(), 0..3),
         put_in in vec((any::<Index>(), byte()), 0..3),
@@ -391,7 +391,7 @@ proptest! {
     }
 
     #[test]
-    fn headers_of_loosely_written_numbers_are_refused_or_the_only_encoding(
+    fn headers_with_loosely_encoded_numbers_are_refused_or_the_only_encoding(
         topology in select(Topology::ALL.to_vec()),
         seed in (0_u8..3, loose_varint()),
         numbers in [loose_varint(), loose_varint(), loose_varint()],
@@ -463,7 +463,7 @@ fn below(end: usize, rng: &mut ChaCha8Rng) -> usize {
     rng.next_u32() as usize % end
 }
 
-/// The name of what decoding came to.
+/// The name of the outcome of decoding.
 fn outcome(result: Result<EncodedGenome<'_>, DecodeError>) -> String {
     match result {
         Ok(_) => "accepted".to_owned(),
@@ -481,7 +481,7 @@ fn half_a_million_random_containers_reach_every_outcome_and_never_panic() {
     let mut outcomes = BTreeMap::<String, u32>::new();
     let valid = containers();
     for case in 0..500_000 {
-        // Mostly the small ones, whose checksums take little time.
+        // Mostly small containers, whose checksums take little time.
         let any_size = below(32, &mut rng) == 0;
         let mut bytes = loop {
             let bytes = &valid[below(valid.len(), &mut rng)];
@@ -491,7 +491,7 @@ fn half_a_million_random_containers_reach_every_outcome_and_never_panic() {
         };
         let header_end = PREFIX_BYTES + usize::from(bytes[5]);
         if below(4, &mut rng) == 0 {
-            // A beginning of the header, then anything.
+            // The start of a header, then anything.
             let right = PREFIX_BYTES + below(20, &mut rng);
             rng.fill_bytes(&mut bytes[right..]);
         } else {
@@ -504,7 +504,7 @@ fn half_a_million_random_containers_reach_every_outcome_and_never_panic() {
             bytes.truncate(bytes.len() - below(100, &mut rng));
             repair_length(&mut bytes);
         }
-        // Up to three wrong bytes at the front, and at times a wrong length or checksum.
+        // Up to three wrong bytes at the front, and sometimes a wrong length or checksum.
         for _ in 0..below(4, &mut rng) {
             let start = if below(8, &mut rng) == 0 {
                 0
@@ -532,7 +532,7 @@ fn half_a_million_random_containers_reach_every_outcome_and_never_panic() {
     assert_eq!(outcomes.len(), 15, "seed {SEED}: {outcomes:?}");
 }
 
-/// Decodes to this error, whose message holds these words.
+/// Asserts that decoding fails with this error and that its message contains these words.
 fn assert_refused(bytes: &[u8], error: DecodeError, words: &[&str]) {
     assert_eq!(decode(bytes), Err(error));
     let message = error.to_string();
@@ -847,7 +847,7 @@ fn refuses_numbers_of_weights_that_do_not_fit() {
     fields.weights.push(0);
     refused(&fields);
 
-    // Half a weight too much.
+    // Half a weight too many.
     let mut weights = right.weight_bytes();
     weights.push(0);
     assert_refused(
@@ -864,7 +864,7 @@ fn refuses_numbers_of_weights_that_do_not_fit() {
 }
 
 #[test]
-fn refuses_the_weight_minus_32768_wherever_it_stands() {
+fn refuses_the_weight_minus_32768_at_any_index() {
     for index in 0..616 {
         let mut fields = largest();
         fields.weights[index] = i16::MIN;
@@ -880,8 +880,8 @@ fn refuses_the_weight_minus_32768_wherever_it_stands() {
 }
 
 #[test]
-fn errors_are_found_in_the_order_of_the_format() {
-    // Everything is wrong; one thing after the other is put right.
+fn errors_are_reported_in_the_order_of_the_format() {
+    // Everything is wrong at first; then one error after another is corrected.
     let right = largest();
     let mut fields = right.clone();
     fields.kernel = [0; 8];
@@ -952,7 +952,8 @@ fn errors_are_found_in_the_order_of_the_format() {
 /// The example of `docs/genome-format.md`.
 static FIXTURE: &[u8] = include_bytes!("b-predefined-line.genome");
 
-/// What the fixture holds: sensor model B, predefined line, weights from ChaCha8 seeded with 2020.
+/// The contents of the fixture: sensor model B, predefined line, weights from ChaCha8 seeded with
+/// 2020.
 fn fixture() -> (Genome, Provenance) {
     let topology = Topology::new(SensorModel::B, Prediction::Predefined(Template::Line)).unwrap();
     let genome = Genome::random(topology, &mut rng());

@@ -1,4 +1,5 @@
-//! A control step as `network` and the paper define it, in plain loops, against the crate's own.
+//! Compares a control step with the definition in `network` and in the paper, written as plain
+//! loops.
 
 use minimal_surprise_controller::network::{MAX_HIDDEN, Network, SELF_LOOP};
 use minimal_surprise_controller::{
@@ -10,13 +11,13 @@ use rand_core::{Rng, SeedableRng};
 
 const SEED: u64 = 2014;
 
-/// Sums end in the range of 16 bits before they are activated.
+/// Sums saturate to 16 bits before activation.
 fn act(sum: i64) -> i64 {
     activate(sum.clamp(i16::MIN.into(), i16::MAX.into()) as i16).into()
 }
 
-/// The signs of the outputs, and the new hidden values. `last` holds the hidden values before,
-/// where the network has self-loops.
+/// Returns the signs of the outputs and the new hidden values. `last` holds the previous hidden
+/// values if the network has self-loops.
 fn forward(
     weights: &mut impl Iterator<Item = i16>,
     inputs: &[bool],
@@ -45,7 +46,7 @@ fn forward(
     (outputs, hidden)
 }
 
-/// Inputs, hidden neurons and outputs of both networks, as the paper has them.
+/// Inputs, hidden neurons and outputs of both networks, as in the paper.
 fn sizes(topology: Topology) -> ([usize; 2], Option<[usize; 2]>) {
     let [action, free] = match topology.model() {
         SensorModel::A => [[9, 6], [8, 8]],
@@ -60,7 +61,7 @@ fn sizes(topology: Topology) -> ([usize; 2], Option<[usize; 2]>) {
     (action, prediction)
 }
 
-/// Small weights, weights all over their range, or saturated ones.
+/// Small weights, weights across the whole range, or saturated weights.
 fn genome(topology: Topology, kind: usize, rng: &mut ChaCha8Rng) -> Genome {
     let weights: Vec<i16> = (0..topology.weights())
         .map(|_| {
@@ -77,7 +78,7 @@ fn genome(topology: Topology, kind: usize, rng: &mut ChaCha8Rng) -> Genome {
 }
 
 #[test]
-fn every_step_is_what_the_equations_say() {
+fn every_step_follows_the_equations() {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     for topology in Topology::ALL {
         for kind in [0, 0, 1, 1, 2] {
@@ -116,7 +117,7 @@ fn every_step_is_what_the_equations_say() {
                     let mut signs = signs.into_iter();
                     for sensor in 0..sensors {
                         if topology.predicted().get(sensor) {
-                            let sign = signs.next().expect("an output a predicted sensor");
+                            let sign = signs.next().expect("one output per predicted sensor");
                             predicted = predicted & !(1 << sensor) | u16::from(sign) << sensor;
                         }
                     }
@@ -146,7 +147,7 @@ fn every_step_is_what_the_equations_say() {
     }
 }
 
-/// A network shows the weights that come next, and zeros where it has no neuron.
+/// Asserts that a network exposes the next weights, and zeros where it has no neuron.
 fn assert_shows<const H: usize, const O: usize>(
     network: &Network<H, O>,
     weights: &mut impl Iterator<Item = i16>,
@@ -182,7 +183,7 @@ fn assert_shows<const H: usize, const O: usize>(
 }
 
 #[test]
-fn a_controller_shows_the_weights_of_its_genome() {
+fn a_controller_exposes_the_weights_of_its_genome() {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     for topology in Topology::ALL {
         let genome = genome(topology, 1, &mut rng);

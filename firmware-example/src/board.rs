@@ -1,6 +1,6 @@
-//! The emulated board: how a program ends there.
+//! The emulated board: how a program ends.
 //!
-//! Linking this module also brings in the logger and the critical section that it needs.
+//! Linking this module also links the logger and the critical section that it needs.
 //!
 //! With `unsafe` code: the wheels' register is an address.
 #![allow(unsafe_code)]
@@ -11,12 +11,12 @@ use cortex_m as _;
 use cortex_m_semihosting::debug::{EXIT_FAILURE, EXIT_SUCCESS, ExitStatus, exit};
 use defmt_semihosting as _;
 
-/// Ends the emulator: the program did what it should.
+/// Ends the emulator with success.
 pub fn succeed() -> ! {
     end(EXIT_SUCCESS)
 }
 
-/// Ends the emulator: the program cannot go on. What is wrong has been logged.
+/// Ends the emulator with failure, after the error has been logged.
 pub fn fail() -> ! {
     end(EXIT_FAILURE)
 }
@@ -27,10 +27,10 @@ fn end(status: ExitStatus) -> ! {
     }
 }
 
-/// The lights of the board, which stand for the left and the right wheel: bits 0 and 1.
+/// The lights of the board, which stand for the left wheel (bit 0) and the right wheel (bit 1).
 pub(crate) const WHEELS: u32 = 0x4002_8000;
 
-// SAFETY: a register of lights only.
+// SAFETY: a register that only controls lights.
 static WHEELS_OFF: WheelsOff<1> = unsafe { WheelsOff::new([[WHEELS, 0]]) };
 
 #[panic_handler]

@@ -1,12 +1,12 @@
-//! What happens first in every fault: the wheels stop.
+//! Fault handling: in every fault, the wheels stop first.
 //!
-//! A fault may come while the program holds a lock, or because the stack is full. So the handlers
-//! of [`fault_handlers`](crate::fault_handlers) take no lock and use no stack and no variable until
-//! a few registers are written, the board's [`WheelsOff`]. Then they start again at the top of the
-//! stack, which nothing else needs any more, and say what has happened.
+//! A fault may occur while the program holds a lock, or because the stack is full. So the handlers
+//! of [`fault_handlers`](crate::fault_handlers) take no lock and use neither stack nor variables
+//! until they have written a few registers, the board's [`WheelsOff`]. Then they reset the stack
+//! pointer to the top of the stack, which is no longer needed, and report the fault.
 //!
-//! **Stack guard.** `memory.x` puts the stack below all variables, at the start of RAM, and
-//! [`guard_stack`] forbids what is below RAM. So a stack that is full is a fault at once, and no
+//! **Stack guard.** `memory.x` places the stack below all variables, at the start of RAM, and
+//! [`guard_stack`] forbids access below RAM. So a stack overflow is a fault immediately, and no
 //! variable is overwritten.
 //!
 //! With `unsafe` code: registers are addresses, and the handlers are in assembler.
@@ -14,20 +14,21 @@
 
 use core::{fmt, ptr};
 
-/// The processor's register that says which exception is handled.
+/// The processor's register with the number of the current exception.
 const INTERRUPT_STATE: *const u32 = 0xe000_ed04 as *const u32;
-/// Its bits that do.
+/// The bits of that register that hold the number.
 const EXCEPTION: u32 = 0x1ff;
 /// The exception of a hard fault, and of the non-maskable interrupt.
 const HARD_FAULT: u32 = 3;
 const NON_MASKABLE: u32 = 2;
-/// Where an exception leaves the address of the instruction it came at, above the stack pointer.
+/// Offset from the stack pointer at which an exception stores the address of the interrupted
+/// instruction.
 const PC_AT: u32 = 24;
 
 /// Registers of the memory protection unit.
 mod mpu {
     pub(super) const CONTROL: *mut u32 = 0xe000_ed94 as *mut u32;
-    /// On; what no region covers is as without it. In faults it is off.
+    /// On; addresses outside all regions have their default access. Off during faults.
     pub(super) const CONTROL_ON: u32 = 0b101;
     pub(super) const REGION: *mut u32 = 0xe000_ed98 as *mut u32;
     pub(super) const START: *mut u32 = 0xe000_ed9c as *mut u32;
@@ -36,11 +37,11 @@ mod mpu {
     pub(super) const FORBIDDEN_32_KIB: u32 = 1 << 28 | 14 << 1 | 1;
 }
 
-/// The 32 KiB below RAM, more than any function's frame.
+/// The 32 KiB below RAM, larger than any function's frame.
 const BELOW_RAM: u32 = 0x1fff_8000;
 
-/// Forbids the addresses below RAM, which begins at 0x20000000. Without this it is up to the chip
-/// what becomes of writes to where nothing is; QEMU's `mps2-an386` ignores them.
+/// Forbids access to the addresses below RAM, which begins at 0x20000000. Without this, the effect
+/// of writes to unmapped addresses depends on the chip; QEMU's `mps2-an386` ignores them.
 pub fn guard_stack() {
     // SAFETY: registers of the processor. No variable is in the region.
     unsafe {
@@ -81,22 +82,21 @@ impl<const N: usize> WheelsOff<N> {
     }
 }
 
-/// What the processor cannot go on after.
+/// A fault after which the program cannot continue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// The stack is full.
     StackOverflow,
-    /// A hard fault, at this address.
+    /// A hard fault at this address.
     HardFault(u32),
-    /// The non-maskable interrupt, at this address.
+    /// The non-maskable interrupt at this address.
     NonMaskable(u32),
-    /// An exception or interrupt of this number that the program has no handler for, at this
-    /// address.
+    /// An exception or interrupt with this number that has no handler, at this address.
     Unexpected(u32, u32),
 }
 
 impl Fault {
-    /// The fault whose handler runs, from the stack pointer at its start.
+    /// Determines the current fault from the stack pointer at the start of its handler.
     #[must_use]
     pub fn from_stack_pointer(stack_pointer: u32) -> Self {
         unsafe extern "C" {
@@ -107,7 +107,7 @@ impl Fault {
         if !stack.contains(&stack_pointer) {
             return Self::StackOverflow;
         }
-        // SAFETY: registers that the exception has left on the stack, and one of the processor.
+        // SAFETY: registers that the exception has saved on the stack, and one of the processor.
         let (pc, exception) = unsafe {
             let pc = ptr::read_volatile((stack_pointer + PC_AT) as *const u32);
             (pc, ptr::read_volatile(INTERRUPT_STATE) & EXCEPTION)
@@ -133,8 +133,8 @@ impl fmt::Display for Fault {
     }
 }
 
-/// Defines the handlers of hard faults, which other faults become, and of all exceptions and
-/// interrupts without a handler of their own. They write a static [`WheelsOff`] and then call a
+/// Defines the handlers of hard faults, to which other faults escalate, and of all exceptions and
+/// interrupts without their own handler. They write a static [`WheelsOff`] and then call a
 /// `fn(Fault) -> !`.
 #[macro_export]
 macro_rules! fault_handlers {
@@ -165,8 +165,7 @@ macro_rules! fault_handlers {
             "b 0b",
             "1:",
             "dsb",
-            // Floating-point registers that still have to be saved, on a stack that may be full,
-            // are given up.
+            // Cancels the lazy saving of floating-point registers to a stack that may be full.
             "movw r1, #0xef34",
             "movt r1, #0xe000",
             "ldr r2, [r1]",

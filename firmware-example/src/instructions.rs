@@ -1,9 +1,9 @@
 //! Counting instructions under QEMU.
 //!
-//! With `-icount`, QEMU's clock advances by a fixed time an instruction, and SysTick counts that
-//! time. How many ticks an instruction takes is found out with a block of `nop`s. These are
-//! instructions executed, not cycles: QEMU does not model a pipeline, and on the chip some
-//! instructions take more than one cycle.
+//! With `-icount`, QEMU's clock advances by a fixed time per instruction, and SysTick counts that
+//! time. A block of `nop`s calibrates how many ticks an instruction takes. These are instructions
+//! executed, not cycles: QEMU does not model a pipeline, and on the chip some instructions take
+//! more than one cycle.
 
 use core::sync::atomic::{Ordering, compiler_fence};
 use cortex_m::asm::nop;
@@ -13,7 +13,7 @@ use cortex_m::peripheral::syst::SystClkSource;
 /// SysTick counts down from here.
 pub const RELOAD: u32 = 0x00ff_ffff;
 
-/// `nop`s of the calibration.
+/// Number of `nop`s for the calibration.
 const NOPS: u32 = 1000;
 
 /// Counts the instructions of a piece of work.
@@ -25,8 +25,8 @@ pub struct Counter {
 }
 
 impl Counter {
-    /// Starts SysTick and calibrates it. `None` if it does not follow the instructions, as without
-    /// `-icount`.
+    /// Starts SysTick and calibrates it. `None` if it does not count instructions, for example
+    /// without `-icount`.
     #[must_use]
     pub fn new(mut systick: SYST) -> Option<Self> {
         systick.set_clock_source(SystClkSource::Core);
@@ -49,7 +49,8 @@ impl Counter {
             .then_some(counter)
     }
 
-    /// Instructions of `work`, and its result. Up to about 650,000: then SysTick wraps around.
+    /// Returns the number of instructions of `work`, and its result. At most about 650,000
+    /// instructions: then SysTick wraps around.
     pub fn count<T>(&self, work: impl FnOnce() -> T) -> (u32, T) {
         let mut result = None;
         let ticks = ticks(|| result = Some(work()));
@@ -59,7 +60,7 @@ impl Counter {
         }
     }
 
-    /// Instructions of so many ticks, which are those of reading the clock twice and some work.
+    /// Converts ticks to instructions, excluding the ticks of reading the clock twice.
     #[must_use]
     pub fn instructions(&self, ticks: u32) -> u32 {
         let scaled = u64::from(ticks.saturating_sub(self.empty_ticks)) * u64::from(NOPS);
@@ -68,7 +69,7 @@ impl Counter {
     }
 }
 
-/// Ten times the same.
+/// Repeats an instruction ten times.
 macro_rules! ten {
     ($work:expr) => {
         $work;
@@ -85,7 +86,7 @@ macro_rules! ten {
 }
 use ten;
 
-/// Ticks from before `work` to behind it.
+/// Ticks from before `work` until after it.
 #[inline(always)]
 fn ticks(work: impl FnOnce()) -> u32 {
     let start = SYST::get_current();

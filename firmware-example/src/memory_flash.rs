@@ -1,4 +1,4 @@
-//! Flash in RAM, as fast as memory-mapped flash is.
+//! Flash in RAM, as fast as memory-mapped flash.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
@@ -14,7 +14,7 @@ pub struct MemoryFlash {
 }
 
 impl MemoryFlash {
-    /// As it comes from the factory.
+    /// A flash in its factory state.
     #[must_use]
     pub const fn new() -> Self {
         Self {

@@ -1,7 +1,7 @@
 //! The board of QEMU's machine `mps2-an386`: serial line, clock, and flash in a file on the host.
 //!
-//! Its wheels are two lights, and it detects one neighbour that is not there; the link's step
-//! request is what drives it.
+//! Its wheels are two lights, and it detects one simulated neighbour; the host drives it with step
+//! requests.
 //!
 //! With `unsafe` code: device registers are addresses, and so are the arguments of semihosting.
 #![allow(unsafe_code)]
@@ -24,14 +24,14 @@ use minimal_surprise_link::Report;
 
 /// The processor's clock.
 const CLOCK_HZ: u32 = 25_000_000;
-/// Control periods a second.
+/// Control periods per second.
 pub const CONTROL_HZ: u32 = 10;
 
 /// The serial line, the first UART of Arm's CMSDK.
 mod uart {
-    /// A byte received; a byte to send.
+    /// The byte received, or the byte to send.
     pub(super) const DATA: *mut u32 = 0x4000_4000 as *mut u32;
-    /// Whether there is one, and whether there is room for one.
+    /// Whether a byte was received, and whether there is room for a byte to send.
     pub(super) const STATE: *mut u32 = 0x4000_4004 as *mut u32;
     pub(super) const STATE_SENDING: u32 = 1;
     pub(super) const STATE_RECEIVED: u32 = 1 << 1;
@@ -44,7 +44,7 @@ mod uart {
     pub(super) const DIVIDER: *mut u32 = 0x4000_4010 as *mut u32;
 }
 
-/// Bits a second; QEMU only wants a speed.
+/// Bits per second; QEMU only requires some speed.
 const BAUD: u32 = 115_200;
 
 /// The interrupt of a received byte.
@@ -60,7 +60,7 @@ unsafe impl InterruptNumber for Received {
 
 /// Serial line and clock.
 ///
-/// No interrupt is ever taken: they only wake the processor, and the loop looks what there is.
+/// No interrupt is ever taken: interrupts only wake the processor, and the loop polls.
 pub struct Mps2 {
     systick: SYST,
     periods: u32,
@@ -77,7 +77,7 @@ impl Mps2 {
         systick.clear_current();
         systick.enable_interrupt();
         systick.enable_counter();
-        // SAFETY: registers of a device that nothing else uses. The interrupt is masked.
+        // SAFETY: registers of a device that no other code uses. The interrupt is masked.
         unsafe {
             ptr::write_volatile(uart::DIVIDER, CLOCK_HZ / BAUD);
             let control =
@@ -93,14 +93,14 @@ impl Mps2 {
 }
 
 fn uart_state() -> u32 {
-    // SAFETY: a device register whose reading changes nothing.
+    // SAFETY: reading this device register has no side effects.
     unsafe { ptr::read_volatile(uart::STATE) }
 }
 
 impl Board for Mps2 {
     const CELL_MM: f32 = 100.0;
 
-    /// A neighbour that goes around the robot.
+    /// A neighbour that circles the robot.
     fn detect(&mut self, neighbours: &mut Neighbours<NEIGHBOURS_MAX>) -> bool {
         self.periods = self.periods.wrapping_add(1);
         let eighths = (self.periods / CONTROL_HZ % 8) as f32;
@@ -118,7 +118,7 @@ impl Board for Mps2 {
             Motion::Left => 0b10,
             Motion::Right => 0b01,
         };
-        // SAFETY: a register of lights only.
+        // SAFETY: a register that only controls lights.
         unsafe { ptr::write_volatile(WHEELS as *mut u32, turning) };
     }
 
@@ -126,7 +126,7 @@ impl Board for Mps2 {
         if uart_state() & uart::STATE_RECEIVED == 0 {
             return None;
         }
-        // SAFETY: device registers; reading the data takes the byte.
+        // SAFETY: device registers; reading the data register consumes the byte.
         let data = unsafe {
             ptr::write_volatile(uart::INTERRUPT, uart::INTERRUPT_RECEIVED);
             ptr::read_volatile(uart::DATA)
@@ -153,11 +153,12 @@ impl Board for Mps2 {
     }
 
     fn sleep(&mut self) {
-        // A pending interrupt ends it at once, so nothing that came in the meantime is missed.
+        // A pending interrupt ends the wait immediately, so no byte that arrived in the meantime is
+        // missed.
         asm::wfi();
     }
 
-    /// This machine's watchdog is not used: a debugger would have to feed it.
+    /// The machine's watchdog is not used: a debugger would have to feed it.
     fn feed_watchdog(&mut self) {}
 
     fn restarted_by_watchdog(&self) -> bool {
@@ -169,8 +170,8 @@ impl Board for Mps2 {
     }
 }
 
-/// Flash in the file `flash.bin`, in the directory that QEMU was started in. What has been written
-/// is there after QEMU was killed.
+/// Flash in the file `flash.bin`, in the directory where QEMU was started. Written data survives
+/// when QEMU is killed.
 ///
 /// As strict as real flash: words of 4 bytes, pages of 4 KiB, no word written twice.
 #[derive(Debug)]
@@ -183,7 +184,7 @@ pub struct FileFlash {
 pub enum FileError {
     /// Out of bounds or not aligned.
     Place(#[defmt(Debug2Format)] NorFlashErrorKind),
-    /// The host's system reports an error.
+    /// The host's operating system reports an error.
     Host,
     /// The word is not erased.
     WrittenTwice,
@@ -204,14 +205,14 @@ impl From<NorFlashErrorKind> for FileError {
     }
 }
 
-/// Bytes erased by one write to the file; between two of them QEMU may be killed.
+/// Bytes erased by one write to the file; QEMU may be killed between two of these writes.
 const ERASE_STEP: usize = 512;
 
 impl FileFlash {
     /// Bytes of the flash: room for two slots.
     pub const CAPACITY: usize = 2 * Self::ERASE_SIZE;
 
-    /// Opens the file, or makes one as it comes from the factory.
+    /// Opens the file, or creates one in the factory state.
     ///
     /// # Errors
     /// [`FileError::Host`].
@@ -266,7 +267,8 @@ impl FileFlash {
 
 fn host_open(mode: usize) -> Option<usize> {
     let name = c"flash.bin".to_bytes_with_nul();
-    // SAFETY: the host reads the name, which ends with a zero byte, and its length without that.
+    // SAFETY: the host reads the name, which ends with a zero byte, and its length without that
+    // byte.
     let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.len() - 1) };
     (handle != usize::MAX).then_some(handle)
 }

@@ -1,7 +1,7 @@
-//! Hashes of everything that the controller computes, to be equal on every machine.
+//! Hashes of everything that the controller computes, which must be equal on every machine.
 //!
 //! All 65,536 activations; and for every topology the decisions and hidden values of many control
-//! steps. Genomes and sensor bits come from ChaCha8 with the seed [`SEED`] and the topology's place
+//! steps. Genomes and sensor bits come from ChaCha8 with the seed [`SEED`] and the topology's index
 //! in [`Topology::ALL`] as its stream.
 
 use core::fmt;
@@ -15,8 +15,8 @@ use sha2::{Digest as _, Sha256};
 /// Seed of the generator that genomes and sensor bits are drawn from.
 pub const SEED: u64 = 0x5357_4152_4d20_4d34;
 
-/// How often every weight of a genome mutates: a genome for each entry. The last ones have weights
-/// all over the range of `i16`, many of them saturated.
+/// How often every weight of a genome mutates, one entry per genome. The last genomes have weights
+/// across the whole range of `i16`, many of them saturated.
 pub const MUTATIONS: [u32; 10] = [0, 0, 1, 2, 5, 10, 50, 100, 500, 1000];
 
 /// Control steps of each genome.
@@ -46,11 +46,11 @@ impl fmt::Display for Digest {
 /// A result; displayed as the line that a program prints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {
-    /// Over all activations. Begins with the kernel's identity.
+    /// Hash of all activations. Begins with the kernel's identity.
     Activations(Digest),
-    /// Over the control steps of one topology.
+    /// Hash of the control steps of one topology.
     Topology(Topology, Digest),
-    /// Over the digests before, and with them over everything.
+    /// Hash of the digests before, and so of everything.
     Total(Digest),
 }
 
@@ -77,7 +77,7 @@ impl fmt::Display for Line {
     }
 }
 
-/// Computes everything, handing over each line as soon as it is known.
+/// Computes everything, passing on each line as soon as it is known.
 pub fn run(mut line: impl FnMut(Line)) {
     let mut total = Sha256::new();
     let digest = activations();
@@ -91,7 +91,8 @@ pub fn run(mut line: impl FnMut(Line)) {
     line(Line::Total(Digest(total.finalize().into())));
 }
 
-/// Over every activation as a little-endian `i16`, in the order of the inputs from −32768 to 32767.
+/// Hash of every activation as a little-endian `i16`, in the order of the inputs from −32768 to
+/// 32767.
 #[must_use]
 pub fn activations() -> Digest {
     let mut hash = Sha256::new();
@@ -101,8 +102,8 @@ pub fn activations() -> Digest {
     Digest(hash.finalize().into())
 }
 
-/// Over [`STEPS_PER_TOPOLOGY`] steps: action, turn, prediction and all hidden values of each, and
-/// each genome's surprise at its end.
+/// Hash of [`STEPS_PER_TOPOLOGY`] steps: action, turn, prediction and all hidden values of each,
+/// and each genome's surprise at the end.
 #[must_use]
 pub fn control_steps(topology: Topology, stream: u64) -> Digest {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
@@ -128,7 +129,7 @@ pub fn control_steps(topology: Topology, stream: u64) -> Digest {
     Digest(hash.finalize().into())
 }
 
-/// A random genome after so many mutations of every weight.
+/// A random genome after the given number of mutations of every weight.
 #[must_use]
 pub fn draw_genome(topology: Topology, mutations: u32, rng: &mut ChaCha8Rng) -> Genome {
     let every_weight = const { MutationRate::ratio(1, 1).unwrap() };
@@ -139,8 +140,8 @@ pub fn draw_genome(topology: Topology, mutations: u32, rng: &mut ChaCha8Rng) -> 
     genome
 }
 
-/// The next reading, much as a robot meets it: half of the time as the last one, otherwise one
-/// sensor has changed or, as often, all are drawn anew.
+/// The next reading, similar to those of a robot: half of the time the last one, a quarter of the
+/// time with one sensor changed, a quarter of the time drawn anew.
 #[must_use]
 pub fn draw_sensors(last: SensorBits, rng: &mut ChaCha8Rng) -> SensorBits {
     let word = rng.next_u32();

@@ -1,43 +1,43 @@
-//! Faults on purpose, to see that the wheels stop. For the programs `faults`, under QEMU only.
+//! Provokes faults to check that the wheels stop. For the programs `faults`, under QEMU only.
 //!
-//! With `unsafe` code: what makes a fault is nothing else.
+//! With `unsafe` code: only unsafe code causes faults.
 #![allow(unsafe_code)]
 
 use core::arch::asm;
 use core::hint::black_box;
 use core::ptr;
 
-/// Semihosting's call for the command line.
+/// The semihosting call that reads the command line.
 const GET_COMMAND_LINE: u32 = 0x15;
-/// The processor's register of pending exceptions, and its bit of the non-maskable interrupt.
+/// The processor's register of pending exceptions, and its bit for the non-maskable interrupt.
 const INTERRUPT_STATE: *mut u32 = 0xe000_ed04 as *mut u32;
 const NON_MASKABLE_PENDING: u32 = 1 << 31;
-/// Enabling and causing interrupts 0 to 31.
+/// Registers that enable and trigger interrupts 0 to 31.
 const INTERRUPTS_ENABLE: *mut u32 = 0xe000_e100 as *mut u32;
 const INTERRUPTS_PENDING: *mut u32 = 0xe000_e200 as *mut u32;
-/// An interrupt that no program here handles.
+/// An interrupt without a handler in these programs.
 const UNEXPECTED: u32 = 1 << 20;
 /// Forbidden: below RAM.
 const BELOW_RAM: *mut u32 = 0x1fff_fff0 as *mut u32;
-/// Registers of the processor, which are no program.
+/// Registers of the processor, which cannot be executed.
 const NO_PROGRAM: u32 = 0xe000_0001;
 
-/// Provokes the fault that the second word of QEMU's command line for the program names, with
-/// interrupts masked, as if it came while the wheels are set.
+/// Provokes the fault named by the second word of the program's command line, with interrupts
+/// masked, as if it occurred while the wheels are being set.
 ///
 /// # Panics
-/// If that is what was asked for, and if there is no such fault.
+/// If the fault is a panic, is unknown or does not occur.
 pub fn provoke() -> ! {
     let mut line = [0_u8; 64];
     let room: [u32; 2] = [line.as_mut_ptr() as u32, line.len() as u32];
-    // SAFETY: the host writes the line and its length, within the room.
+    // SAFETY: the host writes the line and its length within the buffer.
     unsafe {
         asm!("bkpt #0xab", inout("r0") GET_COMMAND_LINE => _, in("r1") room.as_ptr());
         asm!("cpsid i");
     }
     let line = core::str::from_utf8(&line).unwrap_or("");
     let fault = line.trim_end_matches('\0').split(' ').nth(1);
-    // SAFETY: none of it; the handlers do not come back.
+    // SAFETY: deliberately unsound; the handlers do not return.
     unsafe {
         match fault {
             Some("panic") => panic!("on purpose"),

@@ -1,17 +1,17 @@
 //! Neighbours from a range-and-bearing module on a serial line.
 //!
-//! There is no standard for such modules, so this is one that a builder can make a module speak in
-//! a few lines. After each scan the module sends one frame, framed as on the robot's own line (`00`,
+//! There is no standard protocol for such modules, so this is one that a builder can implement in a
+//! few lines. After each scan the module sends one frame, framed as on the line to the host (`00`,
 //! COBS of message and CRC-32C, `00`; see `docs/link-protocol.md`). The message is
 //!
-//! | bytes | what |
+//! | bytes | contents |
 //! |---|---|
 //! | 1 | neighbours found, 0 to 36 |
 //! | 2 each | range in mm between the centres of the two robots, unsigned, little-endian |
 //! | 2 each | bearing in 1/65536 turn, signed, little-endian; counter-clockwise from straight ahead |
 //!
-//! range and bearing of a neighbour side by side. A scan without neighbours is sent too: silence
-//! means that the module is broken, and the robot stands.
+//! with the range and the bearing of each neighbour next to each other. A scan without neighbours
+//! is sent too: silence means that the module is broken, and the robot stands.
 
 use core::f32::consts::PI;
 use minimal_surprise_controller::neighbours::{Detection, Neighbours};
@@ -20,14 +20,14 @@ use minimal_surprise_link::Decoder;
 /// The bearing of half a turn.
 const HALF_TURN: f32 = 32768.0;
 
-/// Finds scans in the bytes of a module.
+/// Finds scans in the bytes from a module.
 #[derive(Debug, Default)]
 pub struct RangeBearing {
     decoder: Decoder,
 }
 
 impl RangeBearing {
-    /// One that has heard nothing.
+    /// A receiver that has received nothing.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -35,8 +35,8 @@ impl RangeBearing {
         }
     }
 
-    /// Takes a byte. If it completes a scan, `neighbours` then holds this scan's and no others.
-    /// Says whether it does.
+    /// Takes a byte. If the byte completes a scan, replaces `neighbours` with those of the scan.
+    /// Returns whether it does.
     pub fn feed<const N: usize>(&mut self, byte: u8, neighbours: &mut Neighbours<N>) -> bool {
         if !self.decoder.feed(byte) {
             return false;

@@ -1,30 +1,29 @@
-//! How deep a piece of work goes into the stack.
+//! Measures how much stack a function uses.
 //!
-//! With `unsafe` code: it writes to the stack below everything that is on it, and looks what is
-//! left of that.
+//! With `unsafe` code: it writes to the unused stack, and later checks which words have changed.
 #![allow(unsafe_code)]
 
 use core::ptr;
 use core::sync::atomic::{Ordering, compiler_fence};
 use cortex_m::register::msp;
 
-/// Bytes that are looked at; deeper work seems to have this depth.
+/// Bytes that are checked; a larger depth is reported as this one.
 pub const DEPTH_MAX: u32 = 8192;
 
-/// What the stack is painted with.
+/// The pattern written to the unused stack.
 const PAINT: u32 = 0x7a7a_a5a5;
 
-/// Bytes of stack that `work` takes, what it calls included, up to [`DEPTH_MAX`]. No interrupt may
-/// occur.
+/// Returns the bytes of stack that `work` and the functions it calls use, up to [`DEPTH_MAX`]. No
+/// interrupt may occur.
 ///
-/// What counts is the deepest word that was written; a frame may reach deeper without using it.
+/// The deepest word that was written counts; a frame may extend deeper without using it.
 #[inline(never)]
 pub fn depth(work: &mut dyn FnMut()) -> u32 {
     let top = msp::read() & !3;
     let bottom = top - DEPTH_MAX;
     for at in (bottom..top).step_by(4) {
-        // SAFETY: RAM below the stack pointer, at whose lower end this program's variables are far
-        // away; nothing is there as no interrupt occurs.
+        // SAFETY: RAM below the stack pointer, far from this program's variables; nothing uses it
+        // because no interrupt occurs.
         unsafe { ptr::write_volatile(at as *mut u32, PAINT) };
     }
     compiler_fence(Ordering::SeqCst);

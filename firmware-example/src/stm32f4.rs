@@ -1,6 +1,7 @@
-//! Where things are in the flash of an STM32F405 or STM32F407 with 1 MiB.
+//! The layout of the flash of an STM32F405 or STM32F407 with 1 MiB.
 //!
-//! Its last two sectors are the genome slots; the program, `stm32f4/memory.x`, has what is before.
+//! The last two sectors are the genome slots; the program uses the sectors before them
+//! (`stm32f4/memory.x`).
 
 use minimal_surprise_slots::slot_bytes;
 
@@ -8,7 +9,7 @@ use minimal_surprise_slots::slot_bytes;
 pub const FLASH_ADDRESS: u32 = 0x0800_0000;
 /// Bytes of the flash.
 pub const FLASH_BYTES: u32 = 1 << 20;
-/// Bytes of each sector from 0x08020000 on, which is what the chip erases at a time.
+/// Bytes of each sector from 0x08020000 upwards, the chip's erase unit.
 pub const SECTOR_BYTES: u32 = 128 << 10;
 /// Address of slot 0.
 pub const SLOT_0_ADDRESS: u32 = 0x080c_0000;

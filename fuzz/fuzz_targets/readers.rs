@@ -1,4 +1,4 @@
-//! One target of `tests/fuzz/targets.rs`, that which `FUZZ_TARGET` names, guided by coverage.
+//! Runs the target of `tests/fuzz/targets.rs` named by `FUZZ_TARGET`, guided by coverage.
 #![no_main]
 
 #[path = "../../tests/fuzz/targets.rs"]

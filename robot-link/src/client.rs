@@ -6,16 +6,37 @@ use crate::message::{
     decode_reply,
 };
 
-/// The host's end: one request at a time, and the reply that belongs to it.
+/// The host's end of the line: one request at a time, and its reply.
 ///
-/// It knows no clock: whoever waits calls [`Client::timed_out`].
+/// It has no clock: the caller waits, and calls [`Client::timed_out`].
+///
+/// ```
+/// use minimal_surprise_link::{Client, Reply, Request, Server};
+/// # use robot_support::link_robot::{Flash, LinkRobot};
+///
+/// # let mut robot = LinkRobot::start(Flash::new());
+/// let mut client = Client::new(0x1234_5678, Client::ATTEMPTS_MAX);
+/// let mut server = Server::new();
+/// let mut identified = false;
+/// // Stands for the serial line to the robot.
+/// for byte in client.request(&Request::Identify)?.to_vec() {
+///     for &byte in server.feed(byte, &mut robot).unwrap_or_default() {
+///         if let Some(Reply::Identity(identity)) = client.feed(byte) {
+///             println!("{} {}", identity.firmware, identity.version);
+///             identified = true;
+///         }
+///     }
+/// }
+/// assert!(identified);
+/// # Ok::<(), minimal_surprise_link::RequestError>(())
+/// ```
 #[derive(Debug)]
 pub struct Client {
     decoder: Decoder,
     session: u32,
-    /// Number of the next request; none after 2³².
+    /// Number of the next request; `None` after 2³² requests.
     next: Option<u32>,
-    /// Number of the request that waits for its reply, and how often it was sent.
+    /// Number of the request that awaits its reply, and how often it was sent.
     pending: Option<(u32, u32)>,
     attempts_max: u32,
     wire: [u8; WIRE_BYTES_MAX],
@@ -24,10 +45,11 @@ pub struct Client {
     last_malformed: Option<MalformedMessage>,
 }
 
-/// This request cannot be sent, or not now.
+/// The request cannot be sent, or not yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RequestError {
-    /// The last one has neither been answered nor given up.
+    /// The last request has neither been answered nor given up.
     #[error("the robot has not answered the last request yet")]
     Pending,
     /// A session begins with [`Request::Identify`].
@@ -44,7 +66,7 @@ pub enum RequestError {
     SessionExhausted,
 }
 
-/// The robot has not answered. Whether it carried the request out is not known.
+/// The robot has not answered. It may or may not have carried out the request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no answer to a request sent {attempts} times")]
 pub struct GaveUp {
@@ -53,11 +75,11 @@ pub struct GaveUp {
 }
 
 impl Client {
-    /// How often a request is sent unless told otherwise.
+    /// Default for how often a request is sent.
     pub const ATTEMPTS_MAX: u32 = 5;
 
-    /// A new session; its number must not have been used on this line before: take a random one.
-    /// A request is sent at most `attempts_max` times, and at least once.
+    /// A new session. Its number must not have been used on this line before: use a random one. A
+    /// request is sent at most `attempts_max` times, and at least once.
     #[must_use]
     pub const fn new(session: u32, attempts_max: u32) -> Self {
         Self {
@@ -73,7 +95,8 @@ impl Client {
         }
     }
 
-    /// From the next attempt on, a request is sent at most so many times, and at least once.
+    /// Limits how often a request is sent, from the next attempt on. A request is sent at least
+    /// once.
     pub const fn set_attempts_max(&mut self, attempts_max: u32) {
         self.attempts_max = attempts_max;
     }
@@ -81,7 +104,7 @@ impl Client {
     /// The bytes to send for a request. Wait [`Request::timeout_ms`] for the reply.
     ///
     /// # Errors
-    /// [`RequestError`]; nothing is to be sent then.
+    /// [`RequestError`]; send nothing in that case.
     pub fn request(&mut self, request: &Request<'_>) -> Result<&[u8], RequestError> {
         if self.pending.is_some() {
             return Err(RequestError::Pending);
@@ -111,8 +134,8 @@ impl Client {
         Ok(self.frame())
     }
 
-    /// Takes one byte from the line; gives the reply to the pending request if that completes it.
-    /// All else that arrives is counted and dropped.
+    /// Takes one byte from the line; returns the reply to the pending request if the byte completes
+    /// it. Anything else that arrives is counted and dropped.
     pub fn feed(&mut self, byte: u8) -> Option<Reply<'_>> {
         if !self.decoder.feed(byte) {
             return None;
@@ -135,7 +158,7 @@ impl Client {
         }
     }
 
-    /// The reply has not come in time: the bytes to send again.
+    /// Call this if the reply has not arrived in time. Returns the bytes to send again.
     ///
     /// # Errors
     /// [`GaveUp`] if that was the last attempt, or nothing was pending; another request may follow.
@@ -159,14 +182,14 @@ impl Client {
         self.strays
     }
 
-    /// Why the last frame that was no message of this protocol was none; tells another device, or
-    /// another version, from silence.
+    /// Why the last malformed frame was not a message of this protocol. Distinguishes another
+    /// device, or another version, from silence.
     #[must_use]
     pub fn last_malformed(&self) -> Option<MalformedMessage> {
         self.last_malformed
     }
 
-    /// What arrived that was no frame.
+    /// Counts of received data that was not a valid frame.
     #[must_use]
     pub fn errors(&self) -> LineErrors {
         self.decoder.errors()

@@ -4,16 +4,17 @@ use cobs::{CobsEncoder, DecodeResult, DecoderState};
 use minimal_surprise_controller::codec::CRC_32C;
 use serde::Serialize;
 
-/// Most bytes of a message.
+/// Maximum size of a message, in bytes.
 pub const PAYLOAD_BYTES_MAX: usize = 146;
-/// Bytes of the CRC-32C behind the message, little-endian.
+/// Bytes of the CRC-32C after the message, little-endian.
 const CRC_BYTES: usize = 4;
-/// Most bytes of a frame before COBS.
+/// Maximum size of a frame before COBS, in bytes.
 pub const FRAME_BYTES_MAX: usize = PAYLOAD_BYTES_MAX + CRC_BYTES;
-/// Most bytes of a frame on the line: a zero before it, one byte of COBS, a zero behind it.
+/// Maximum size of a frame on the line, in bytes: a zero before it, one byte of COBS, a zero after
+/// it.
 pub const WIRE_BYTES_MAX: usize = FRAME_BYTES_MAX + 3;
 
-// One byte of overhead is enough for so few.
+// One byte of overhead is enough for frames this short.
 const _: () = assert!(FRAME_BYTES_MAX < 254);
 
 /// The message does not fit a frame.
@@ -22,7 +23,7 @@ const _: () = assert!(FRAME_BYTES_MAX < 254);
 #[error("a message of more than {PAYLOAD_BYTES_MAX} bytes")]
 pub struct EncodeError;
 
-/// Writes a message as a frame to `wire` and says how many bytes that took.
+/// Writes a message as a frame to `wire` and returns the number of bytes written.
 ///
 /// # Errors
 /// [`EncodeError`] if the message or the frame does not fit.
@@ -41,17 +42,17 @@ pub fn encode(message: &impl Serialize, wire: &mut [u8]) -> Result<usize, Encode
     Ok(length + 2)
 }
 
-/// What has arrived that was no frame.
+/// Counts of received data that was not a valid frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineErrors {
     /// Frames with a wrong CRC.
     pub bad_crc: u32,
-    /// Bytes between two zero bytes that are no frame: broken, cut off or too long.
+    /// Bytes between two zero bytes that are not a frame: damaged, truncated or too long.
     pub no_frame: u32,
 }
 
-/// Finds frames in a stream of bytes, of which any may be missing, wrong or too many.
+/// Finds frames in a stream of bytes, some of which may be missing, wrong or extra.
 #[derive(Debug)]
 pub struct Decoder {
     cobs: DecoderState,
@@ -63,7 +64,7 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// One that has seen nothing.
+    /// A decoder that has received nothing.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -79,7 +80,7 @@ impl Decoder {
         }
     }
 
-    /// Takes one byte; says whether it completed a frame with the right CRC. Its message is in
+    /// Takes one byte; returns whether it completed a frame with a correct CRC. The message is in
     /// [`Decoder::payload`] until the next byte is fed.
     pub fn feed(&mut self, byte: u8) -> bool {
         if self.complete {
@@ -121,7 +122,7 @@ impl Decoder {
         }
     }
 
-    /// Its CRC; 0 if there is none.
+    /// The CRC of that frame; 0 if there is none.
     #[must_use]
     pub fn crc(&self) -> u32 {
         match self.frame() {
@@ -130,7 +131,7 @@ impl Decoder {
         }
     }
 
-    /// What was no frame so far.
+    /// Counts of received data that was not a valid frame.
     #[must_use]
     pub fn errors(&self) -> LineErrors {
         self.errors
@@ -171,7 +172,7 @@ impl Default for Decoder {
     }
 }
 
-/// One more, unless there is no larger number.
+/// Adds one to a counter, saturating.
 pub(crate) fn count(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }

@@ -1,13 +1,4 @@
-//! The line between a robot and its host, both ends of it.
-//!
-//! The host asks, the robot answers; one request at a time. Every frame is a [`postcard`] message
-//! with a CRC-32C, in COBS, between zero bytes. Requests are numbered, so that the host may repeat
-//! one until an answer comes, and the robot carries it out once. `docs/link-protocol.md` describes
-//! every byte.
-//!
-//! The robot feeds every byte that arrives to a [`Server`] and sends what that returns; a
-//! [`Handler`] does the work. The host makes requests with a [`Client`] and tells it when it has
-//! waited long enough. Neither knows a clock or a port.
+#![doc = include_str!("../README.md")]
 #![no_std]
 #![forbid(unsafe_code)]
 #![cfg_attr(

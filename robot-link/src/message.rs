@@ -1,18 +1,18 @@
-//! What is said: requests, replies, and the envelope around them.
+//! Messages: requests, replies, and the envelope around them.
 
 use minimal_surprise_controller::{Decision, KernelId, SensorBits, Surprise};
 use serde::{Deserialize, Serialize};
 
 /// Version of the protocol, the first byte of every message.
 pub const PROTOCOL_VERSION: u8 = 1;
-/// Most bytes of a genome in one request.
+/// Maximum number of genome bytes in one request.
 pub const CHUNK_BYTES_MAX: usize = 128;
-/// Most bytes of a firmware's name; what is beyond is cut off.
+/// Maximum length of a firmware's name, in bytes; longer names are truncated.
 pub const FIRMWARE_BYTES_MAX: usize = 32;
-/// Most bytes of a firmware's version; what is beyond is cut off.
+/// Maximum length of a firmware's version, in bytes; longer versions are truncated.
 pub const VERSION_BYTES_MAX: usize = 16;
 
-/// Which way a message goes; an echo is not an answer.
+/// Direction of a message, so that an echo is not taken for a reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Direction {
@@ -22,29 +22,30 @@ pub enum Direction {
     Reply,
 }
 
-/// A message and what it belongs to.
+/// A message with its session and its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Envelope<B> {
     /// [`PROTOCOL_VERSION`].
     pub version: u8,
-    /// Which way it goes.
+    /// Direction of the message.
     pub direction: Direction,
-    /// The conversation that it belongs to; the host chooses a number that it has not used before.
+    /// The session that the message belongs to; the host chooses a number that it has not used
+    /// before.
     pub session: u32,
-    /// Number of the request in the session, from 0 on; a reply has that of its request.
+    /// Number of the request in the session, counted from 0; a reply has the number of its request.
     pub sequence: u32,
     /// [`Request`] or [`Reply`].
     pub body: B,
 }
 
-/// What the host may ask.
+/// A request from the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Request<'a> {
-    /// Who are you? Number 0 of every session is this. Answer: [`Reply::Identity`].
+    /// Who are you? Request 0 of every session. Answer: [`Reply::Identity`].
     Identify,
-    /// A genome container will come; erases the slot that is not in use. Answer: [`Reply::Done`].
+    /// A genome container follows; erases the slot that is not in use. Answer: [`Reply::Done`].
     Begin {
         /// Bytes of the container.
         length: u16,
@@ -53,12 +54,12 @@ pub enum Request<'a> {
     },
     /// The next bytes of the container. Answer: [`Reply::Done`].
     Chunk {
-        /// Bytes that came before.
+        /// Number of bytes before these.
         offset: u16,
         /// At most [`CHUNK_BYTES_MAX`] bytes.
         data: &'a [u8],
     },
-    /// All has been sent: check it, and run it from now on. Answer: [`Reply::Committed`].
+    /// The container is complete: check it, and run it from now on. Answer: [`Reply::Committed`].
     Commit,
     /// One control step with these readings instead of the robot's own, without moving. Answer:
     /// [`Reply::Stepped`].
@@ -66,13 +67,13 @@ pub enum Request<'a> {
         /// The readings, bit k for sensor k.
         sensors: SensorBits,
     },
-    /// Forget the past: the controller's state as at the start. Answer: [`Reply::Done`].
+    /// Reset the controller's state to that at the start. Answer: [`Reply::Done`].
     Reset,
     /// Run the control loop. Answer: [`Reply::Done`].
     Start,
     /// Stop motors and control loop. Answer: [`Reply::Done`].
     Stop,
-    /// How is it going? Answer: [`Reply::Telemetry`].
+    /// Report the status. Answer: [`Reply::Telemetry`].
     Telemetry,
 }
 
@@ -88,30 +89,30 @@ impl Request<'_> {
     }
 }
 
-/// What the robot answers.
+/// An answer from the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reply<'a> {
     /// To [`Request::Identify`].
     #[serde(borrow)]
     Identity(Identity<'a>),
-    /// It is done, and there is nothing to say about it.
+    /// The request was carried out; there is nothing to report.
     Done,
     /// The genome is in use, also after a restart.
     Committed {
-        /// Place of the genome among all that were written to this robot.
+        /// Number of the genome among all written to this robot.
         write_count: u32,
     },
     /// To [`Request::Step`].
     Stepped(Stepped),
     /// To [`Request::Telemetry`].
     Telemetry {
-        /// What the robot says.
+        /// The robot's report.
         report: Report,
-        /// What its end of the line says.
+        /// The counters of its end of the line.
         line: LineCounters,
     },
-    /// It was not done.
+    /// The request was refused.
     Refused(Refusal),
 }
 
@@ -123,13 +124,13 @@ pub struct Identity<'a> {
     pub firmware: &'a str,
     /// Its version, at most [`VERSION_BYTES_MAX`] bytes.
     pub version: &'a str,
-    /// The arithmetic that it computes with.
+    /// The arithmetic that it uses.
     pub kernel: KernelId,
     /// The genome in use.
     pub genome: GenomeInUse,
     /// Whether the control loop runs.
     pub running: bool,
-    /// What is wrong.
+    /// Current faults.
     pub faults: Faults,
 }
 
@@ -137,13 +138,13 @@ pub struct Identity<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum GenomeInUse {
-    /// The built-in one, for want of any other: the robot only turns.
+    /// The built-in genome, because there is no other: the robot only turns.
     BuiltIn,
-    /// One that was written.
+    /// A genome that was written.
     Slot {
         /// Which slot, 0 or 1.
         slot: u8,
-        /// Its place among all genomes written to this robot, from 1 on.
+        /// Its number among all genomes written to this robot, counted from 1.
         write_count: u32,
         /// Bytes of the container.
         length: u16,
@@ -152,13 +153,13 @@ pub enum GenomeInUse {
     },
 }
 
-/// What is wrong with a robot, one bit a fault.
+/// The faults of a robot, one bit per fault.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Faults(pub u16);
 
 impl Faults {
-    /// Nothing.
+    /// No fault.
     pub const NONE: Self = Self(0);
     /// No slot holds a genome to run; the built-in one is in use.
     pub const NO_GENOME: Self = Self(1);
@@ -166,18 +167,18 @@ impl Faults {
     pub const SLOT_DAMAGED: Self = Self(1 << 1);
     /// The flash has reported an error.
     pub const FLASH: Self = Self(1 << 2);
-    /// The last neighbour data is too old; the robot stands.
+    /// The latest neighbour data is too old; the robot stands.
     pub const NEIGHBOURS_STALE: Self = Self(1 << 3);
-    /// The last restart was the watchdog's.
+    /// The watchdog caused the last restart.
     pub const WATCHDOG: Self = Self(1 << 4);
 
-    /// These and those.
+    /// All faults of both.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// Whether all of `other` are among these.
+    /// Whether these include all of `other`.
     #[must_use]
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
@@ -204,35 +205,35 @@ pub struct Report {
     pub surprise: Surprise,
     /// Steps that decided to go straight.
     pub straight: u32,
-    /// Of these, those that the guard held back, for the cell ahead was occupied.
+    /// Of these, steps that the guard held back because the cell ahead was occupied.
     pub held_back: u32,
     /// Steps that decided to turn left.
     pub turned_left: u32,
     /// Steps that decided to turn right.
     pub turned_right: u32,
-    /// What is wrong.
+    /// Current faults.
     pub faults: Faults,
 }
 
-/// What has arrived at the robot since its start. Counters stay at their largest value.
+/// What has arrived at the robot since its start. Counters saturate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineCounters {
     /// Requests carried out or refused.
     pub accepted: u32,
-    /// Requests that were answered again, not done again.
+    /// Repeated requests: answered again, but not carried out again.
     pub repeated: u32,
-    /// Requests that came too late or of no open session; not done.
+    /// Requests that arrived too late or belong to no open session; not carried out.
     pub stale: u32,
-    /// Frames whose CRC was right but that are no request of this protocol.
+    /// Frames with a correct CRC that are not a request of this protocol.
     pub malformed: u32,
     /// Frames with a wrong CRC.
     pub bad_crc: u32,
-    /// Bytes between two zero bytes that are no frame: broken, cut off or too long.
+    /// Bytes between two zero bytes that are not a frame: damaged, truncated or too long.
     pub no_frame: u32,
 }
 
-/// Why a request was not carried out. Nothing has changed, unless it says so.
+/// Why a request was not carried out. Nothing has changed, unless the variant says so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
@@ -245,19 +246,19 @@ pub enum Refusal {
     /// No update has begun.
     #[error("no genome is being written")]
     NotBegun,
-    /// Chunks come in order.
+    /// Chunks must arrive in order.
     #[error("the robot expects the bytes from {expected} on")]
     WrongOffset {
         /// Bytes that it has.
         expected: u16,
     },
-    /// No container is that long.
+    /// No container has this length.
     #[error("the robot has no room for a genome of that length")]
     ImpossibleLength,
-    /// Bytes beyond the length announced, or fewer than that.
+    /// More or fewer bytes than the length announced.
     #[error("the genome's length is not the one announced")]
     OtherLength,
-    /// The container is not the one announced, or none that this robot runs. The update is over.
+    /// The container is not the one announced, or this robot cannot run it. The update is over.
     #[error("the robot has received a genome that it cannot run")]
     BadGenome,
     /// The flash reports an error, or does not hold what was written. The update is over.
@@ -266,18 +267,19 @@ pub enum Refusal {
     /// This robot cannot do that.
     #[error("the robot cannot do that")]
     Unsupported,
-    /// The slots' write count has reached its end. Robots of firmware before this variant answer
+    /// The slots' write count has reached its maximum. Firmware older than this variant answers
     /// [`Refusal::Flash`].
     #[error(
-        "the robot's count of genomes written has reached its end, so that it takes no more over \
-         the line; erase both of its genome slots with a debug probe, and it counts from 1 again"
+        "the robot's write count has reached its maximum, so it accepts no more genomes over \
+         the line; erase both of its genome slots with a debug probe to restart the count at 1"
     )]
     CountExhausted,
 }
 
-/// A frame whose CRC is right, but not of this protocol.
+/// A frame with a correct CRC that is not a message of this protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum MalformedMessage {
     /// Another version of the protocol.
     #[error("protocol version {found}; this program speaks version {PROTOCOL_VERSION}")]
@@ -285,8 +287,8 @@ pub enum MalformedMessage {
         /// The first byte of the message.
         found: u8,
     },
-    /// A request where a reply is due, or the other way round.
-    #[error("a message that goes the other way")]
+    /// A request where a reply is expected, or a reply where a request is.
+    #[error("a message in the wrong direction")]
     WrongWay,
     /// Not a message, or one with bytes left over or a chunk that is too long.
     #[error("not a message of this protocol")]

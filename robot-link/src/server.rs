@@ -7,10 +7,10 @@ use crate::message::{
 };
 use minimal_surprise_controller::SensorBits;
 
-/// What the robot does when it is asked. Each function is called once for a request, however often
-/// that arrives. What is refused has changed nothing, unless the [`Refusal`] says so.
+/// Carries out requests on the robot. Each function is called once per request, however often the
+/// request arrives. A refused request has changed nothing, unless the [`Refusal`] says so.
 pub trait Handler {
-    /// Says who the robot is and what it runs.
+    /// Returns who the robot is and what it runs.
     fn identify(&mut self) -> Identity<'_>;
 
     /// Prepares to receive a container of `length` bytes whose last four are `crc`, little-endian.
@@ -26,7 +26,7 @@ pub trait Handler {
     /// [`Refusal::Flash`].
     fn chunk(&mut self, offset: u16, data: &[u8]) -> Result<(), Refusal>;
 
-    /// Checks the genome and puts it in use; says the write count.
+    /// Checks the genome and puts it in use; returns the write count.
     ///
     /// # Errors
     /// [`Refusal::NotBegun`], [`Refusal::OtherLength`], [`Refusal::BadGenome`],
@@ -39,40 +39,62 @@ pub trait Handler {
     /// [`Refusal::Running`].
     fn step(&mut self, sensors: SensorBits) -> Result<Stepped, Refusal>;
 
-    /// Forgets the past.
+    /// Resets the controller's state to that at the start.
     ///
     /// # Errors
     /// [`Refusal::Running`].
     fn reset(&mut self) -> Result<(), Refusal>;
 
-    /// Starts the control loop; a robot that runs goes on.
+    /// Starts the control loop; a running robot continues.
     ///
     /// # Errors
     /// [`Refusal::Unsupported`].
     fn start(&mut self) -> Result<(), Refusal>;
 
-    /// Stops motors and control loop; a robot that stands goes on standing.
+    /// Stops motors and control loop; a stopped robot stays stopped.
     ///
     /// # Errors
     /// [`Refusal::Unsupported`].
     fn stop(&mut self) -> Result<(), Refusal>;
 
-    /// Says how it is going.
+    /// Returns a status report.
     fn telemetry(&mut self) -> Report;
 }
 
-/// The robot's end: takes bytes, gives bytes, and sees to it that every request is carried out once.
+/// The robot's end of the line: takes bytes, returns bytes, and ensures that every request is
+/// carried out once.
+///
+/// ```
+/// use minimal_surprise_link::{Client, Request, Server};
+/// # use robot_support::link_robot::{Flash, LinkRobot};
+///
+/// # let mut robot = LinkRobot::start(Flash::new());
+/// let mut client = Client::new(1, Client::ATTEMPTS_MAX);
+/// let received = client.request(&Request::Identify)?.to_vec();
+///
+/// let mut server = Server::new();
+/// let mut answers = 0;
+/// for byte in received {
+///     if let Some(frame) = server.feed(byte, &mut robot) {
+///         assert_eq!(frame.first(), Some(&0), "frames start and end with zero");
+///         answers += 1;
+///     }
+/// }
+/// assert_eq!(answers, 1);
+/// assert_eq!(server.counters().accepted, 1);
+/// # Ok::<(), minimal_surprise_link::RequestError>(())
+/// ```
 #[derive(Debug)]
 pub struct Server {
     decoder: Decoder,
     conversation: Conversation,
 }
 
-/// Who talks to the robot, and what was said last.
+/// The open session and its last exchange.
 #[derive(Debug)]
 struct Conversation {
     session: Option<u32>,
-    /// The one before; it cannot come back.
+    /// The previous session, which cannot be reopened.
     session_before: Option<u32>,
     /// The last request carried out: its number and the CRC of its frame.
     last: (u32, u32),
@@ -97,7 +119,7 @@ enum Answer {
 }
 
 impl Server {
-    /// One that nobody has talked to.
+    /// A server without a session.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -120,8 +142,8 @@ impl Server {
         }
     }
 
-    /// Takes one byte from the line. If it completes a request, that is carried out, and the bytes
-    /// to send are returned.
+    /// Takes one byte from the line. If the byte completes a request, carries it out and returns
+    /// the bytes to send.
     pub fn feed(&mut self, byte: u8, handler: &mut impl Handler) -> Option<&[u8]> {
         if !self.decoder.feed(byte) {
             return None;
@@ -228,7 +250,7 @@ fn carry_out<'h>(
     reply.unwrap_or_else(Reply::Refused)
 }
 
-/// The first bytes of a text, at most `max`, whole characters.
+/// The longest start of a text that has at most `max` bytes and only whole characters.
 fn front(text: &str, max: usize) -> &str {
     text.get(..text.floor_char_boundary(max)).unwrap_or("")
 }
@@ -249,7 +271,7 @@ impl<const N: usize> Wire<N> {
             sequence,
             body,
         };
-        // Every reply fits: the texts are cut to length, all else has a largest size.
+        // Every reply fits: texts are truncated, everything else has a maximum size.
         self.length = encode(&envelope, &mut self.bytes).unwrap_or(0);
     }
 

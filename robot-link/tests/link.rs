@@ -1,8 +1,8 @@
-//! The line between robot and host: whatever arrives, nothing bad is accepted, nothing is done
-//! twice, and a genome gets through.
+//! The line between robot and host: whatever arrives, nothing invalid is accepted, no request is
+//! carried out twice, and a genome gets through.
 //!
-//! 100,000 fuzzed frames, a million with `TEST_ALL=1`. `LINK_SEED` replaces the seed; a failure
-//! prints it.
+//! 100,000 fuzzed frames, a million with `TEST_ALL=1`. `LINK_SEED` replaces the seed, which a
+//! failure prints.
 
 use minimal_surprise_controller::codec::{
     CONTAINER_BYTES_MAX, Provenance, encode as encode_genome,
@@ -25,10 +25,10 @@ use robot_support::link_robot::{Flash, LinkRobot};
 use serde::Serialize;
 use std::collections::VecDeque;
 
-/// Seed unless `LINK_SEED` says otherwise.
+/// Default seed; `LINK_SEED` overrides it.
 const SEED: u64 = 11;
 
-/// Prints what repeats a test that fails.
+/// Prints how to repeat a failed test.
 struct Replay {
     test: &'static str,
     seed: u64,
@@ -91,7 +91,7 @@ fn reply(sequence: u32, body: Reply<'_>) -> Envelope<Reply<'_>> {
     }
 }
 
-/// CRC-32C, a bit at a time, as its definition says.
+/// CRC-32C, bit by bit, as it is defined.
 fn crc_32c(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0, |crc: u32, &byte| {
         (0..8).fold(crc ^ u32::from(byte), |crc, _| {
@@ -101,7 +101,7 @@ fn crc_32c(bytes: &[u8]) -> u32 {
     })
 }
 
-/// COBS, written down from the paper that introduced it.
+/// COBS, written from the paper that introduced it.
 fn reference_cobs(message: &[u8]) -> Vec<u8> {
     let mut wire = vec![0];
     for (index, block) in message.split(|&byte| byte == 0).enumerate() {
@@ -113,7 +113,7 @@ fn reference_cobs(message: &[u8]) -> Vec<u8> {
     wire
 }
 
-/// What a stretch of bytes without zeros holds, if it is a frame: its message.
+/// The message of a stretch of bytes without zeros, if it is a frame.
 fn reference_decode(stretch: &[u8]) -> Option<Vec<u8>> {
     let mut rest = stretch;
     let mut frame = Vec::new();
@@ -130,7 +130,7 @@ fn reference_decode(stretch: &[u8]) -> Option<Vec<u8>> {
     (fits && u32::from_le_bytes(*crc) == crc_32c(payload)).then(|| payload.to_vec())
 }
 
-/// A message with a right CRC, as a frame.
+/// A message as a frame with a correct CRC.
 fn frame_of(payload: &[u8]) -> Vec<u8> {
     let crc = crc_32c(payload).to_le_bytes();
     reference_cobs(&[payload, &crc[..]].concat())
@@ -142,7 +142,7 @@ fn any_bytes(rng: &mut ChaCha8Rng, end: usize) -> Vec<u8> {
     bytes
 }
 
-/// Changes, removes, adds or cuts off bytes.
+/// Changes, removes, inserts or truncates bytes.
 fn mutate(bytes: &mut Vec<u8>, rng: &mut ChaCha8Rng) {
     for _ in 0..1 + below(rng, 3) {
         if bytes.is_empty() {
@@ -159,7 +159,7 @@ fn mutate(bytes: &mut Vec<u8>, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Remembers what it was asked to do.
+/// Records what it was asked to do.
 #[derive(Default)]
 struct Recorder {
     /// `crc` of every request to begin.
@@ -215,7 +215,7 @@ impl Handler for Recorder {
     }
 }
 
-/// Feeds all bytes; the frames that come back.
+/// Feeds all bytes; returns the frames that come back.
 fn feed(server: &mut Server, handler: &mut impl Handler, bytes: &[u8]) -> Vec<Vec<u8>> {
     let answers = bytes.iter().filter_map(|&byte| {
         let answer = server.feed(byte, handler)?;
@@ -235,14 +235,14 @@ fn fuzzed_frames_are_accepted_if_and_only_if_they_are_frames() {
     let (mut server, mut handler) = (Server::new(), Recorder::default());
     // What has arrived since the last zero.
     let mut stretch = Vec::new();
-    // Messages that may arrive whole: those of the last eight frames, and what was made of
-    // them. A frame that has lost its end waits until the next zero.
+    // Messages that may arrive intact: those of the last eight frames, and their mutants. A frame
+    // that has lost its end is pending until the next zero.
     let mut known: VecDeque<Vec<u8>> = VecDeque::from(vec![vec![]; 16]);
     let mut earlier = Vec::new();
     let (mut accepted, mut well_formed) = (0_u64, 0_u64);
     for number in 0..frames {
         let data = any_bytes(&mut rng, CHUNK_BYTES_MAX + 1);
-        // A session is open for a while; some frames belong to none.
+        // A session stays open for a while; some frames belong to no session.
         let [session, sequence] = match below(&mut rng, 8) {
             0 => [0; 2].map(|_: i32| rng.next_u32() >> below(&mut rng, 32)),
             _ => [number as u32 / 32, number as u32 % 32],
@@ -273,7 +273,7 @@ fn fuzzed_frames_are_accepted_if_and_only_if_they_are_frames() {
         match below(&mut rng, 8) {
             0 => {}
             1 => wire = any_bytes(&mut rng, 200),
-            // Twice, or once more later.
+            // Sent twice, or repeated later.
             4 => wire = [&wire, &earlier, &wire[..]].concat(),
             // A frame by definition, but not necessarily a message.
             2 => {
@@ -335,7 +335,7 @@ fn fuzzed_frames_are_accepted_if_and_only_if_they_are_frames() {
 }
 
 #[test]
-fn repeated_and_late_requests_among_garbage_are_done_once_and_in_order() {
+fn repeated_and_late_requests_among_garbage_are_carried_out_once_and_in_order() {
     let replay = Replay::of("repeated_and_late");
     let mut rng = replay.rng();
     let (mut server, mut handler) = (Server::new(), Recorder::default());
@@ -371,7 +371,7 @@ fn repeated_and_late_requests_among_garbage_are_done_once_and_in_order() {
                 expected.stale += 1;
             }
             3 => {
-                // Another request under a number that was used.
+                // Another request with a number already used.
                 let other = wire_of(&request(session, last as u32, Request::Identify));
                 if other != sent[last] {
                     assert!(feed(&mut server, &mut handler, &other).is_empty());
@@ -379,7 +379,7 @@ fn repeated_and_late_requests_among_garbage_are_done_once_and_in_order() {
                 }
             }
             _ => {
-                // The first half of a frame that is yet to come.
+                // The first half of a later frame.
                 let half = &sent[last][..below(&mut rng, sent[last].len() - 1)];
                 assert!(feed(&mut server, &mut handler, half).is_empty());
             }
@@ -397,7 +397,7 @@ fn repeated_and_late_requests_among_garbage_are_done_once_and_in_order() {
     assert_eq!(handler.begun, once);
 }
 
-/// One direction of a bad line.
+/// One direction of an unreliable line.
 struct Line {
     on_the_way: VecDeque<Vec<u8>>,
     late: Option<Vec<u8>>,
@@ -411,7 +411,7 @@ impl Line {
         }
     }
 
-    /// Loses, damages, doubles or delays one frame in three.
+    /// Drops, damages, duplicates or delays one frame in three.
     fn send(&mut self, frame: &[u8], rng: &mut ChaCha8Rng) {
         let mut frame = frame.to_vec();
         match below(rng, 24) {
@@ -431,7 +431,7 @@ impl Line {
     }
 }
 
-/// Host, robot, and the line between.
+/// Host, robot, and the line between them.
 struct Simulation {
     client: Client,
     server: Server,
@@ -455,7 +455,7 @@ impl Simulation {
         }
     }
 
-    /// Sends a request until its reply comes; gives that to `check`.
+    /// Sends a request until its reply arrives, and passes the reply to `check`.
     fn ask(&mut self, request: &Request<'_>, check: impl FnOnce(Reply<'_>)) {
         let frame = self.client.request(request).unwrap().to_vec();
         self.to_robot.send(&frame, &mut self.rng);
@@ -469,7 +469,7 @@ impl Simulation {
             let arrived: Vec<u8> = self.to_host.on_the_way.drain(..).flatten().collect();
             for byte in arrived {
                 if let Some(reply) = self.client.feed(byte) {
-                    // What is left of this delivery belongs to requests of the past.
+                    // The rest of this delivery belongs to earlier requests.
                     return check(reply);
                 }
             }
@@ -494,7 +494,7 @@ fn container(seed: u64, topology: Topology) -> Vec<u8> {
 }
 
 #[test]
-fn a_genome_gets_through_a_bad_line_and_is_written_once() {
+fn a_genome_gets_through_an_unreliable_line_and_is_written_once() {
     let replay = Replay::of("a_genome_gets_through");
     let runs = if all_cases() { 2_000 } else { 50 };
     let (mut frames_sent, mut needed) = (0, 0);
@@ -525,7 +525,7 @@ fn a_genome_gets_through_a_bad_line_and_is_written_once() {
             assert_eq!(reply, Reply::Committed { write_count: 1 });
         });
 
-        // It runs, and every step is made once.
+        // It runs, and every step is carried out once.
         let decoded = EncodedGenome::decode(&genome).unwrap();
         let controller = Controller::from_encoded(&decoded);
         let mut state = State::new(&controller);
@@ -566,7 +566,7 @@ fn a_genome_gets_through_a_bad_line_and_is_written_once() {
 }
 
 #[test]
-fn a_robot_that_was_restarted_says_so_and_a_session_that_ended_stays_ended() {
+fn a_restarted_robot_reports_it_and_an_ended_session_stays_ended() {
     let mut handler = Recorder::default();
     let mut server = Server::new();
     let refused = |sequence, session| {
@@ -582,7 +582,7 @@ fn a_robot_that_was_restarted_says_so_and_a_session_that_ended_stays_ended() {
     assert_eq!(feed(&mut server, &mut handler, &open(1)).len(), 1);
     assert_eq!(feed(&mut server, &mut handler, &open(2)).len(), 1);
     assert_eq!(handler.calls, 2);
-    // Late arrivals of the session before.
+    // Late frames of the previous session.
     assert_eq!(feed(&mut server, &mut handler, &open(1)), [refused(0, 1)]);
     assert_eq!(feed(&mut server, &mut handler, &start), [refused(5, 1)]);
     assert_eq!(handler.calls, 2);
@@ -648,7 +648,7 @@ fn clients_take_only_the_reply_to_their_pending_request() {
 }
 
 #[test]
-fn a_client_starts_with_nothing_to_tell_and_gives_up_nothing() {
+fn a_new_client_has_no_errors_and_no_request_to_give_up() {
     let mut client = Client::new(7, 1);
     assert_eq!(client.timed_out(), Err(GaveUp { attempts: 0 }));
     assert_eq!((client.strays(), client.last_malformed()), (0, None));
@@ -658,7 +658,7 @@ fn a_client_starts_with_nothing_to_tell_and_gives_up_nothing() {
 }
 
 #[test]
-fn the_attempts_of_a_client_can_be_changed_also_under_way() {
+fn the_attempts_of_a_client_can_be_changed_while_a_request_is_pending() {
     let mut client = Client::new(7, 1);
     client.request(&Request::Identify).unwrap();
     client.set_attempts_max(3);
@@ -670,7 +670,7 @@ fn the_attempts_of_a_client_can_be_changed_also_under_way() {
 }
 
 #[test]
-fn a_client_counts_what_is_no_frame_by_its_kind() {
+fn a_client_counts_invalid_frames_by_kind() {
     let mut client = Client::new(7, 1);
     let mut wrong_crc = frame_of(&[PROTOCOL_VERSION, 1]);
     let last = wrong_crc.len() - 2;
@@ -695,7 +695,7 @@ fn a_client_counts_what_is_no_frame_by_its_kind() {
 }
 
 #[test]
-fn a_decoder_shows_message_and_crc_from_the_last_byte_of_a_frame_to_the_next_byte() {
+fn a_decoder_returns_message_and_crc_from_the_last_byte_of_a_frame_until_the_next_byte() {
     let mut decoder = Decoder::new();
     let payload = [PROTOCOL_VERSION, 0, 7];
     let wire = frame_of(&payload);
@@ -713,7 +713,7 @@ fn a_decoder_shows_message_and_crc_from_the_last_byte_of_a_frame_to_the_next_byt
 }
 
 #[test]
-fn a_chunk_longer_than_any_is_no_message_although_its_frame_is_whole() {
+fn an_overlong_chunk_is_not_a_message_although_its_frame_is_intact() {
     let data = &[1; CHUNK_BYTES_MAX + 10];
     for length in [CHUNK_BYTES_MAX + 1, CHUNK_BYTES_MAX + 10] {
         let data = &data[..length];
@@ -738,7 +738,7 @@ fn request_0_is_to_identify_and_nothing_else() {
 }
 
 #[test]
-fn messages_that_go_the_other_way_are_told_as_such_by_both_ends() {
+fn messages_in_the_wrong_direction_are_recognised_by_both_ends() {
     let payload = |wire: Vec<u8>| reference_decode(&wire[1..wire.len() - 1]).unwrap();
     let sensors = SensorBits::new(1);
     for body in [Request::Identify, Request::Step { sensors }, Request::Stop] {
@@ -752,7 +752,7 @@ fn messages_that_go_the_other_way_are_told_as_such_by_both_ends() {
 }
 
 #[test]
-fn every_kind_of_fault_is_a_bit_of_its_own() {
+fn every_kind_of_fault_has_its_own_bit() {
     let kinds = [
         Faults::NO_GENOME,
         Faults::SLOT_DAMAGED,
@@ -783,7 +783,7 @@ fn only_an_erase_takes_more_than_half_a_second() {
 }
 
 #[test]
-fn telemetry_counts_its_own_request_and_all_that_came_before() {
+fn telemetry_counts_its_own_request_and_all_earlier_ones() {
     let (mut server, mut handler) = (Server::new(), Recorder::default());
     let identify = wire_of(&request(7, 0, Request::Identify));
     feed(&mut server, &mut handler, &identify);

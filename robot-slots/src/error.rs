@@ -1,13 +1,14 @@
-//! What can be wrong with a place for slots, with a slot, with an update.
+//! Errors of a slot location, a slot and an update.
 
 use minimal_surprise_controller::DecodeError;
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 
-/// There is no place for two slots there.
+/// Two slots cannot be placed there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum PlaceError {
-    /// Slots start where an erase unit does.
+    /// The offset is not aligned to the chip's erase units.
     #[error("slots at {offset}: not a multiple of the {erase_size} bytes erased at a time")]
     NotAligned {
         /// The byte address asked for.
@@ -15,7 +16,7 @@ pub enum PlaceError {
         /// Bytes that the chip erases at a time.
         erase_size: usize,
     },
-    /// The chip ends before the second slot does.
+    /// The second slot does not fit into the flash.
     #[error("two slots of {slot_bytes} bytes at {offset} do not fit a flash of {capacity}")]
     OutOfBounds {
         /// The byte address asked for.
@@ -27,7 +28,7 @@ pub enum PlaceError {
     },
 }
 
-/// A slot was committed, but what is in it cannot be run.
+/// A slot was committed, but its genome cannot be run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Defect {
@@ -47,53 +48,53 @@ pub enum Defect {
     Refused(#[from] DecodeError),
 }
 
-/// An update was not carried out. The genome in use stays in use, and stays after a restart.
+/// An update failed. The genome in use stays in use, also after a restart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum UpdateError<E: core::fmt::Debug> {
     /// The chip reports an error. The update is over; begin again.
     #[error("flash error: {0:?}")]
     Flash(E),
-    /// No container is that long.
-    #[error("a container of {found} bytes; they have 1 to {CONTAINER_BYTES_MAX}")]
+    /// No container has this length.
+    #[error("a container of {found} bytes; containers have 1 to {CONTAINER_BYTES_MAX}")]
     ImpossibleLength {
         /// The length announced.
         found: usize,
     },
-    /// The write count has reached its end, after 2³² − 1 updates.
+    /// The write count has reached its maximum, after 2³² − 1 updates.
     #[error("no more updates can be counted")]
     CountExhausted,
-    /// There is no update to go on with.
+    /// No update is in progress.
     #[error("no update has begun")]
     NotBegun,
-    /// Chunks come in order, without gaps. The update goes on.
+    /// Chunks must arrive in order, without gaps. The update continues.
     #[error("a chunk for offset {found}; the next one starts at {expected}")]
     WrongOffset {
         /// Offset of the chunk, in bytes.
         found: u16,
-        /// Bytes taken so far.
+        /// Bytes received so far.
         expected: u16,
     },
-    /// The chunk goes beyond the length announced. The update goes on.
+    /// The chunk exceeds the length announced. The update continues.
     #[error("{excess} bytes beyond the {length} announced")]
     TooMuch {
-        /// Bytes too many.
+        /// Number of surplus bytes.
         excess: usize,
         /// The length announced.
         length: u16,
     },
-    /// Not all of the container has arrived. The update goes on.
+    /// The container is incomplete. The update continues.
     #[error("{taken} of {length} bytes have arrived")]
     Incomplete {
-        /// Bytes taken so far.
+        /// Bytes received so far.
         taken: u16,
         /// The length announced.
         length: u16,
     },
-    /// What is in flash is not what was written. The update is over; begin again.
+    /// The flash does not hold what was written. The update is over; begin again.
     #[error("the flash does not hold what was written")]
     NotWritten,
-    /// What is in flash is not a genome to run. The update is over.
+    /// The flash does not hold a genome that can be run. The update is over.
     #[error(transparent)]
     Defect(#[from] Defect),
 }

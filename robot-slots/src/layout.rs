@@ -1,4 +1,4 @@
-//! Where things are in a slot, and the bytes of its header and its commit record.
+//! The layout of a slot, and the bytes of its header and its commit record.
 
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, CRC_32C};
 
@@ -9,12 +9,12 @@ pub const BLOCK_BYTES: usize = 32;
 pub const COMMIT_AT: u32 = BLOCK_BYTES as u32;
 /// Offset of the genome container in a slot, in bytes.
 pub const CONTAINER_AT: u32 = 2 * BLOCK_BYTES as u32;
-/// Bytes that the longest container takes, whatever the word size.
+/// Bytes that the longest container takes, for any word size.
 pub const ROOM_BYTES: usize = CONTAINER_BYTES_MAX.next_multiple_of(BLOCK_BYTES);
 /// Bytes of a slot, before rounding up to whole erase units.
 pub const SLOT_BYTES_MIN: usize = CONTAINER_AT as usize + ROOM_BYTES;
-/// Largest write count to give a slot that is made outside the robot: the updates that it leaves,
-/// 2²⁴, are more than any flash endures.
+/// Largest write count for a slot that is made outside the robot: it leaves 2²⁴ updates, more than
+/// any flash endures.
 pub const MADE_WRITE_COUNT_MAX: u32 = u32::MAX - (1 << 24);
 /// First bytes of a slot; the last one is the version of the layout.
 pub const MAGIC: [u8; 4] = *b"MSS1";
@@ -24,19 +24,19 @@ pub(crate) type Block = [u8; BLOCK_BYTES];
 /// What erased flash reads as.
 pub(crate) const ERASED: Block = [0xff; BLOCK_BYTES];
 
-/// Bytes of a slot in a chip that erases `erase_size` bytes at a time; a multiple of that.
+/// Bytes of a slot in a chip that erases `erase_size` bytes at a time; a multiple of `erase_size`.
 ///
-/// The two slots follow each other, so that the chip needs twice as much.
+/// The two slots are adjacent, so the chip needs twice as much.
 #[must_use]
 pub const fn slot_bytes(erase_size: usize) -> usize {
     SLOT_BYTES_MIN.next_multiple_of(erase_size)
 }
 
-/// What a slot's header says about its contents.
+/// The header of a slot, which describes its contents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// Place of the genome among all written so far, from 1 on; the larger is the newer.
+    /// Number of the genome among all written so far, counted from 1; the larger is newer.
     pub write_count: u32,
     /// Bytes of the container, 1 to [`CONTAINER_BYTES_MAX`].
     pub length: u16,
@@ -45,7 +45,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// The header's block; what is not used stays erased.
+    /// The header's block; unused bytes stay erased.
     pub(crate) fn to_block(self) -> Block {
         let [m0, m1, m2, m3] = MAGIC;
         let [n0, n1, n2, n3] = self.write_count.to_le_bytes();
@@ -57,8 +57,8 @@ impl Header {
         block_of(header)
     }
 
-    /// What precedes the container in a slot that was committed, for those who write a whole slot
-    /// at once: the header and its commit record.
+    /// The bytes before the container in a committed slot: the header and its commit record. For
+    /// programs that write a whole slot at once.
     #[must_use]
     pub fn front(self) -> [u8; CONTAINER_AT as usize] {
         let mut front = [0xff; CONTAINER_AT as usize];
@@ -85,8 +85,8 @@ impl Header {
         (*magic == MAGIC && lengths.contains(&usize::from(length))).then_some(header)
     }
 
-    /// The block of the commit record that goes with this header: a CRC-32C of the header, and its
-    /// complement, so that erased flash is never a commit record.
+    /// The block of the commit record for this header: a CRC-32C of the header, and its complement,
+    /// so that erased flash is never a commit record.
     pub(crate) fn commit_block(self) -> Block {
         let header = self.to_block();
         let (fields, _) = header.split_at(HEADER_BYTES);
@@ -111,7 +111,7 @@ pub(crate) const fn commit_bytes(word: usize) -> usize {
     COMMIT_BYTES.next_multiple_of(word)
 }
 
-/// The bytes at the front of an erased block.
+/// An erased block that starts with the given bytes.
 fn block_of<const N: usize>(bytes: [u8; N]) -> Block {
     let mut block = ERASED;
     for (place, byte) in block.iter_mut().zip(bytes) {
@@ -142,11 +142,11 @@ mod tests {
         assert_eq!(HEADER.front().as_slice(), [header, commit].concat());
     }
 
-    /// Worked out by another program.
+    /// Computed by another program.
     const COMMIT: [u8; 8] = [0x96, 0x80, 0xce, 0xd7, 0x69, 0x7f, 0x31, 0x28];
 
     #[test]
-    fn lengths_that_no_container_has_are_no_header() {
+    fn blocks_with_an_impossible_container_length_are_not_headers() {
         for length in [0, CONTAINER_BYTES_MAX as u16 + 1, u16::MAX] {
             let header = Header { length, ..HEADER };
             assert_eq!(Header::from_block(&header.to_block()), None, "{length}");

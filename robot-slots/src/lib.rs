@@ -1,28 +1,4 @@
-//! Two genome slots in flash; power may fail at any moment.
-//!
-//! A genome is written to the slot that is not in use, read back, checked, and committed by the
-//! last word written. Until then the slot in use is not touched; from then on the new one wins.
-//!
-//! ```text
-//! one slot: whole erase units, at least 1376 bytes
-//!  0   16  header: "MSS1", write count, container length, container CRC; all u32, little-endian
-//! 32    8  commit record: CRC-32C of the header's 16 bytes, and its complement
-//! 64    n  genome container, which ends with its own CRC-32C
-//! ```
-//!
-//! Each of the three is padded with 0xff to whole words; what is between them stays erased.
-//! `docs/genome-slots.md` has the whole story.
-//!
-//! **Start.** A slot counts if its commit record belongs to its header, and its container decodes
-//! and is the one that the header announces. The larger write count wins. Without any such slot
-//! the robot gets a controller that only turns.
-//!
-//! **Update.** Erase; header; container; read back; commit record; read back. The erase is never
-//! left out: flash whose erase was interrupted can read as erased and yet not be. So no word is
-//! written twice between erases.
-//!
-//! **Stack.** Nothing here keeps a container on the stack: it is read into a [`Buffer`] that the
-//! caller owns, or [`InPlace`].
+#![doc = include_str!("../README.md")]
 #![no_std]
 #![forbid(unsafe_code)]
 #![cfg_attr(
@@ -49,16 +25,12 @@ pub use room::{Buffer, InPlace, MappedFlash, Room};
 use embedded_storage::nor_flash::NorFlash;
 use layout::{Block, ERASED, commit_bytes, header_bytes};
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
-use minimal_surprise_controller::{
-    Controller, EncodedGenome, Prediction, SensorModel, Topology, TopologyError,
-};
+use minimal_surprise_controller::{Controller, EncodedGenome, Prediction, SensorModel, Topology};
 
 /// Topology of the built-in controller: model C, everything predicted by the network.
 pub const BUILT_IN_TOPOLOGY: Topology = match Topology::new(SensorModel::C, Prediction::Free) {
     Ok(topology) => topology,
-    Err(TopologyError::NoSuchTemplate { .. } | TopologyError::NotPartly { .. }) => {
-        panic!("model C exists")
-    }
+    Err(_) => panic!("model C exists"),
 };
 
 /// The controller of a robot without a genome: whatever it senses, it turns clockwise on the spot.
@@ -73,7 +45,7 @@ pub fn built_in_controller() -> Controller {
 pub enum Slot {
     /// The one at the lower address.
     First,
-    /// The one behind it.
+    /// The one at the higher address.
     Second,
 }
 
@@ -106,14 +78,14 @@ impl Slot {
 pub enum SlotState {
     /// Nothing: header and commit record read as erased.
     Empty,
-    /// An update that was never committed. Does no harm.
+    /// An update that was never committed. Harmless.
     Unfinished,
-    /// A genome that was committed. That of the slot in use has been checked.
+    /// A committed genome. That of the slot in use has been checked.
     Committed(Header),
-    /// A genome that was committed but cannot be run. A fault.
+    /// A committed genome that cannot be run. A fault.
     Damaged(Header, Defect),
-    /// The flash reports an error when header and commit record are read. A fault, unless an
-    /// update was interrupted: on chips that correct errors, words half-written cannot be read.
+    /// The flash reports an error when header and commit record are read. A fault, unless an update
+    /// was interrupted: on chips with error correction, half-written words cannot be read.
     Unreadable,
 }
 
@@ -132,7 +104,7 @@ impl SlotState {
     }
 }
 
-/// What the robot is to run.
+/// What the robot must run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum InUse<'a> {
@@ -145,7 +117,7 @@ pub enum InUse<'a> {
         /// The genome.
         genome: EncodedGenome<'a>,
     },
-    /// [`built_in_controller`], for there is no genome. A fault to report.
+    /// [`built_in_controller`], because there is no genome. A fault to report.
     BuiltIn,
 }
 
@@ -167,11 +139,33 @@ struct Update {
     header: Header,
     /// Bytes of the container that have arrived.
     taken: u16,
-    /// Those that do not fill a block yet; erased beyond.
+    /// The bytes that do not fill a block yet; the rest of the block is erased.
     block: Block,
 }
 
 /// Two slots in a flash.
+///
+/// ```
+/// use minimal_surprise_controller::{Genome, Provenance, Topology, codec};
+/// use minimal_surprise_slots::{Buffer, InUse, Slots};
+/// # use robot_support::link_robot::Flash;
+///
+/// # let (flash, offset) = (Flash::new(), Flash::OFFSET);
+/// let mut buffer = Buffer::new();
+/// let mut slots = Slots::open(flash, offset, &mut buffer)?;
+/// assert_eq!(slots.in_use(&mut buffer), InUse::BuiltIn);
+///
+/// let genome = Genome::zeroed(Topology::default());
+/// let mut container = [0; codec::CONTAINER_BYTES_MAX];
+/// let container = codec::encode(&genome, Provenance::default(), &mut container)?;
+/// let write_count = slots.write(container, &mut buffer)?;
+/// assert_eq!(write_count, 1);
+///
+/// // After a restart, the new genome is in use.
+/// let mut slots = Slots::open(slots.release(), offset, &mut buffer)?;
+/// assert_eq!(slots.in_use(&mut buffer).controller().topology(), genome.topology());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Slots<F> {
     flash: F,
@@ -187,7 +181,7 @@ impl<F: NorFlash> Slots<F> {
     /// Bytes of one slot of this chip.
     pub const SLOT_BYTES: usize = slot_bytes(F::ERASE_SIZE);
 
-    /// Words must divide blocks and erase units; another chip does not compile.
+    /// Words must divide blocks and erase units; other chips are rejected at compile time.
     const CHIP_FITS: () = assert!(
         BLOCK_BYTES.is_multiple_of(F::WRITE_SIZE)
             && BLOCK_BYTES.is_multiple_of(F::READ_SIZE)
@@ -197,11 +191,11 @@ impl<F: NorFlash> Slots<F> {
         "read and write sizes must be powers of two up to 32 that divide the erase size"
     );
 
-    /// Looks for the newest genome in the slots at `offset`, a byte address in `flash`. Writes
-    /// nothing. A flash that cannot be read is no error but a [`SlotState`].
+    /// Finds the newest genome in the slots at `offset`, a byte address in `flash`. Writes nothing.
+    /// Unreadable flash is reported as a [`SlotState`], not as an error.
     ///
     /// # Errors
-    /// [`PlaceError`] if two slots cannot be there.
+    /// [`PlaceError`] if two slots cannot be placed there.
     pub fn open(flash: F, offset: u32, room: &mut impl Room<F>) -> Result<Self, PlaceError> {
         let () = Self::CHIP_FITS;
         let erase_size = F::ERASE_SIZE;
@@ -248,7 +242,7 @@ impl<F: NorFlash> Slots<F> {
         Ok(slots)
     }
 
-    /// The genome to run, and where it comes from. Reads and checks the container once more.
+    /// The genome to run, and where it comes from. Reads and checks the container again.
     pub fn in_use<'a>(&'a mut self, room: &'a mut impl Room<F>) -> InUse<'a> {
         let Some((slot, header)) = self.in_use else {
             return InUse::BuiltIn;
@@ -264,13 +258,13 @@ impl<F: NorFlash> Slots<F> {
         }
     }
 
-    /// The slot in use and its header; `None` if the built-in controller is.
+    /// The slot in use and its header; `None` if the built-in controller is in use.
     #[must_use]
     pub fn newest(&self) -> Option<(Slot, Header)> {
         self.in_use
     }
 
-    /// What was found in a slot, or what has become of it since.
+    /// The current state of a slot.
     #[must_use]
     pub fn state(&self, slot: Slot) -> SlotState {
         let [first, second] = self.states;
@@ -287,16 +281,15 @@ impl<F: NorFlash> Slots<F> {
         self.write_count
     }
 
-    /// Gives the flash back.
+    /// Returns the flash.
     pub fn release(self) -> F {
         self.flash
     }
 
     /// Begins an update: erases the slot that is not in use and writes the header. `crc` is the
-    /// container's last four bytes, little-endian. An update that had begun is over.
+    /// container's last four bytes, little-endian. An update in progress is dropped.
     ///
-    /// The chip may stall for as long as it erases, seconds for large erase units: stop motors
-    /// first.
+    /// The chip may stall while it erases, for seconds if erase units are large: stop motors first.
     ///
     /// # Errors
     /// [`UpdateError::ImpossibleLength`], [`UpdateError::CountExhausted`], [`UpdateError::Flash`].
@@ -327,7 +320,7 @@ impl<F: NorFlash> Slots<F> {
         Ok(())
     }
 
-    /// Takes the next bytes of the container; `offset` says how many came before.
+    /// Takes the next bytes of the container; `offset` is the number of bytes before them.
     ///
     /// # Errors
     /// [`UpdateError::NotBegun`], [`UpdateError::WrongOffset`], [`UpdateError::TooMuch`],
@@ -347,14 +340,14 @@ impl<F: NorFlash> Slots<F> {
         if excess > 0 {
             return Err(UpdateError::TooMuch { excess, length });
         }
-        // Over, should a write fail.
+        // A failed write ends the update.
         self.update = None;
         self.update = Some(self.take_bytes(update, data)?);
         Ok(())
     }
 
-    /// Ends the update: reads the container back, checks it and commits it. Says the write count.
-    /// When this returns, the new genome is in use, also after a restart.
+    /// Ends the update: reads the container back, checks it and commits it. Returns the write
+    /// count. After that, the new genome is in use, also after a restart.
     ///
     /// # Errors
     /// [`UpdateError::NotBegun`], [`UpdateError::Incomplete`], [`UpdateError::NotWritten`],
@@ -385,7 +378,7 @@ impl<F: NorFlash> Slots<F> {
         let at = self.address(slot, COMMIT_AT);
         let commit = header.commit_block();
         let written = self.write_block(at, &commit, commit_bytes(F::WRITE_SIZE));
-        // Only what is there counts, whatever the chip said: it decides after a restart.
+        // Only the bytes in flash count, whatever the chip reported: they decide after a restart.
         match self.check_block(at, &commit) {
             Ok(()) => {
                 *self.state_mut(slot) = SlotState::Committed(header);
@@ -397,19 +390,19 @@ impl<F: NorFlash> Slots<F> {
         }
     }
 
-    /// Drops an update that has begun, if there is one.
+    /// Drops an update in progress, if any.
     pub fn abort(&mut self) {
         self.update = None;
     }
 
-    /// Bytes of the container that have arrived; `None` if no update has begun.
+    /// Bytes of the container that have arrived; `None` if no update is in progress.
     #[must_use]
     pub fn taken(&self) -> Option<u16> {
         self.update.map(|update| update.taken)
     }
 
-    /// A whole update: refuses what is not a genome to run before anything is erased, then begins,
-    /// writes and commits. Says the write count.
+    /// Performs a whole update: before anything is erased, refuses bytes that are not a genome that
+    /// can be run; then begins, writes and commits. Returns the write count.
     ///
     /// # Errors
     /// [`UpdateError::ImpossibleLength`], [`UpdateError::CountExhausted`],
@@ -449,7 +442,7 @@ impl<F: NorFlash> Slots<F> {
         Ok(update)
     }
 
-    /// The slot that is not in use; without any, the one with the older contents.
+    /// The slot that is not in use; if none is, the one with the older contents.
     fn slot_to_write(&self) -> Slot {
         let [first, second] = self.states.map(SlotState::write_count);
         match self.in_use {
@@ -485,7 +478,7 @@ impl<F: NorFlash> Slots<F> {
         Ok(block)
     }
 
-    /// Writes the front of a block.
+    /// Writes the first bytes of a block.
     fn write_block(
         &mut self,
         at: u32,
@@ -504,7 +497,7 @@ impl<F: NorFlash> Slots<F> {
         }
     }
 
-    /// Address in flash of a place in a slot.
+    /// Address in flash of an offset in a slot.
     fn address(&self, slot: Slot, place: u32) -> u32 {
         let slots_before = u32::from(slot.index());
         self.offset + slots_before * Self::SLOT_BYTES as u32 + place
@@ -519,7 +512,7 @@ impl<F: NorFlash> Slots<F> {
     }
 }
 
-/// The genome at `at`, if it is one to run and the one that the header announces.
+/// The genome at `at`, if it can be run and is the one that the header announces.
 fn container<'a, F: NorFlash>(
     flash: &'a mut F,
     room: &'a mut impl Room<F>,

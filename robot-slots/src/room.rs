@@ -1,23 +1,23 @@
-//! Where the bytes of a container are read: a buffer, or flash itself where it is memory mapped.
+//! How the bytes of a container are read: into a buffer, or directly from memory-mapped flash.
 
 use crate::layout::ROOM_BYTES;
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 
-/// Gives the bytes of a container that is in flash.
+/// Provides the bytes of a container that is in flash.
 pub trait Room<F: ReadNorFlash> {
-    /// The `length` bytes at `at`, a byte address in flash that is a multiple of its read size;
-    /// `length` is at most the longest container's. `None` if they cannot be read.
+    /// Returns the `length` bytes at `at`, a byte address in flash that is a multiple of its read
+    /// size; `length` is at most that of the longest container. `None` if they cannot be read.
     fn container<'a>(&'a mut self, flash: &'a mut F, at: u32, length: usize) -> Option<&'a [u8]>;
 }
 
-/// Memory for one container, 1.3 KB. Make it a `static`, or part of one; it is much for a stack.
+/// Memory for one container, 1.3 KB. Make it a `static`, or part of one; it is large for a stack.
 #[derive(Clone, Debug)]
 pub struct Buffer {
     bytes: [u8; ROOM_BYTES],
 }
 
 impl Buffer {
-    /// An empty one.
+    /// An empty buffer.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -46,7 +46,7 @@ pub trait MappedFlash: NorFlash {
     fn bytes(&self) -> &[u8];
 }
 
-/// Reads containers where they are, without a copy.
+/// Reads containers in place, without copying them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct InPlace;
 

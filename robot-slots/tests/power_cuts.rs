@@ -1,10 +1,11 @@
-//! The genome slots lose their power at every moment of an update, and again at every moment of
+//! Cuts the power at every moment of an update of the genome slots, and again at every moment of
 //! the recovery.
 //!
-//! A moment is a byte of a write, the end of a write before anybody hears of it, or one of five
-//! ways in which an erase can end. Every first cut is made, and with `TEST_ALL=1` in a release build
-//! every second cut after each; otherwise some of those. `POWER_CUT=write_size:erase_size:first:second`
-//! makes one pair of cuts; a failure prints it.
+//! A moment is a byte of a write, the end of a write before it is reported, or one of five ways in
+//! which an erase can end. Every first cut is tested, and with `TEST_ALL=1` in a release build
+//! every second cut after each; otherwise a sample of the second cuts.
+//! `POWER_CUT=write_size:erase_size:first:second` tests one pair of cuts; a failure prints the
+//! pair.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, CRC_32C, Provenance, encode};
@@ -22,19 +23,19 @@ use std::time::Instant;
 
 /// Seed of the genomes.
 const SEED: u64 = 5;
-/// The reduced run goes on after one first cut in so many, and then makes one second cut in so
-/// many.
+/// The reduced run continues after one in this many first cuts, and then tests one in this many
+/// second cuts.
 const REDUCED: Strides = Strides {
     first: 5,
     second: 601,
 };
-/// All second cuts after all first ones.
+/// Every second cut after every first cut.
 const ALL: Strides = Strides {
     first: 1,
     second: 1,
 };
 
-/// After one second cut in so many, the update is made once more, to its end.
+/// After one in this many second cuts, the update is repeated to its end.
 const THIRD_STRIDE: u64 = 16;
 
 /// A genome container that differs from those of other generations in every part.
@@ -50,7 +51,7 @@ fn container(topology: Topology, generation: u32) -> Vec<u8> {
     encode(&genome, provenance, &mut buffer).unwrap().to_vec()
 }
 
-/// They differ in topology and length.
+/// Two containers that differ in topology and length.
 fn old_and_new() -> [Vec<u8>; 2] {
     [
         container(Topology::ALL[7], 1),
@@ -58,14 +59,14 @@ fn old_and_new() -> [Vec<u8>; 2] {
     ]
 }
 
-/// What the slots give the robot.
+/// What the robot runs from the slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Runs {
     Old,
     New,
 }
 
-/// The genome before an update, and the one that it brings.
+/// The genome before an update, and the new one.
 struct Genomes<'a> {
     old_container: &'a [u8],
     new_container: &'a [u8],
@@ -83,7 +84,7 @@ impl<'a> Genomes<'a> {
         }
     }
 
-    /// Restarts the robot and says what it runs.
+    /// Restarts the robot and returns what it runs.
     fn after_restart<const W: usize, const E: usize>(
         &self,
         flash: &mut MockFlash<W, E>,
@@ -99,7 +100,7 @@ impl<'a> Genomes<'a> {
         }
     }
 
-    /// Restarts the robot and writes the new genome, in chunks as they come over the line.
+    /// Restarts the robot and writes the new genome in chunks, as they arrive over the line.
     fn update<const W: usize, const E: usize>(
         &self,
         flash: &mut MockFlash<W, E>,
@@ -114,7 +115,7 @@ impl<'a> Genomes<'a> {
         slots.commit(room)
     }
 
-    /// A chip with the old genome in one slot and one still older in the other.
+    /// A chip with the old genome in one slot and an even older one in the other.
     fn flash<const W: usize, const E: usize>(&self, room: &mut Buffer) -> MockFlash<W, E> {
         let mut flash = MockFlash::<W, E>::new();
         let mut slots = Slots::open(&mut flash, MockFlash::<W, E>::OFFSET, room).unwrap();
@@ -151,23 +152,23 @@ impl Drop for Case {
     }
 }
 
-/// Which second cuts to make.
+/// Which second cuts to test.
 #[derive(Clone, Copy)]
 struct Strides {
     first: u64,
     second: u64,
 }
 
-/// Which cuts to make.
+/// Which cuts to test.
 #[derive(Clone, Copy)]
 enum Cuts {
-    /// Every first one, and some second ones.
+    /// Every first cut and some second cuts.
     Every(Strides),
-    /// One first, and perhaps one second.
+    /// One first cut and possibly one second cut.
     One(u64, Option<u64>),
 }
 
-/// Makes the cuts on one kind of chip and says how many there were.
+/// Tests the cuts on one kind of chip and returns their number.
 fn cut_updates<const W: usize, const E: usize>(cuts: Cuts) -> u64 {
     let containers = old_and_new();
     let genomes = Genomes::new(&containers);
@@ -310,7 +311,7 @@ fn a_robot_runs_the_old_or_the_new_genome_whenever_its_power_fails() {
 }
 
 #[test]
-fn the_first_genome_of_a_robot_is_there_wholly_or_not_at_all() {
+fn the_first_genome_of_a_robot_is_complete_or_absent() {
     type Flash = MockFlash<4, 256>;
     let room = &mut Buffer::new();
     let genome = container(Topology::default(), 1);
@@ -337,7 +338,7 @@ fn the_first_genome_of_a_robot_is_there_wholly_or_not_at_all() {
         }
         slots.write(&genome, room).expect("power is back");
     }
-    // The last byte can be right although its writing was interrupted.
+    // The last byte can be correct although its write was interrupted.
     assert!(built_in >= moments - 9 && built_in < moments, "{built_in}");
 }
 
@@ -361,7 +362,7 @@ fn slots_alternate_and_count_the_genomes_written() {
 }
 
 #[test]
-fn a_damaged_genome_gives_way_to_the_older_one_and_both_to_the_built_in() {
+fn a_damaged_genome_is_replaced_by_the_older_one_and_two_by_the_built_in_one() {
     type Flash = MockFlash<4, 4096>;
     let room = &mut Buffer::new();
     let mut flash = Genomes::new(&old_and_new()).flash::<4, 4096>(room);
@@ -408,7 +409,7 @@ fn of_two_damaged_genomes_the_older_one_is_replaced() {
 }
 
 #[test]
-fn of_two_genomes_with_one_count_that_of_the_first_slot_is_used() {
+fn of_two_genomes_with_equal_write_counts_the_first_slots_is_used() {
     type Flash = MockFlash<4, 4096>;
     let room = &mut Buffer::new();
     let mut flash = Flash::new();
@@ -431,18 +432,18 @@ fn of_two_genomes_with_one_count_that_of_the_first_slot_is_used() {
     assert_eq!(slots.newest().map(|(slot, _)| slot), Some(Slot::Second));
 }
 
-/// A chip that treats one of its writes like this.
+/// How a chip mishandles one of its writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Treatment {
-    /// Reports success, and has written nothing.
+    /// Reports success but has written nothing.
     Forgets,
-    /// Has written everything, and reports an error.
+    /// Has written everything but reports an error.
     Misreports,
 }
 
 struct Unreliable {
     flash: MockFlash<4, 256>,
-    /// Writes to come before the one that is not carried out well.
+    /// Remaining writes before the mishandled one.
     writes_before: usize,
     treatment: Treatment,
 }
@@ -483,7 +484,7 @@ impl NorFlash for Unreliable {
 }
 
 #[test]
-fn what_a_chip_says_of_a_write_counts_less_than_what_is_there() {
+fn the_bytes_in_flash_count_more_than_what_a_chip_reports_of_a_write() {
     let room = &mut Buffer::new();
     let containers = old_and_new();
     let [old, new] = &containers;
@@ -534,7 +535,7 @@ fn what_a_chip_says_of_a_write_counts_less_than_what_is_there() {
 }
 
 #[test]
-fn slots_that_are_empty_interrupted_and_unreadable_are_told_apart() {
+fn empty_interrupted_and_unreadable_slots_are_distinguished() {
     type Flash = MockFlash<4, 256>;
     let room = &mut Buffer::new();
     let states = |flash: &mut Flash| {
@@ -552,7 +553,7 @@ fn slots_that_are_empty_interrupted_and_unreadable_are_told_apart() {
     assert_eq!(Slot::ALL.map(|slot| slots.state(slot)), expected);
     assert_eq!(states(&mut begun), expected);
 
-    // Words of another program, where a header and where a commit record would be.
+    // Another program's words at the places of the header and the commit record.
     for at in [0, COMMIT_AT] {
         let mut strange = blank.clone();
         strange.write(Flash::OFFSET + at, b"ELF!").unwrap();
@@ -568,7 +569,7 @@ fn slots_that_are_empty_interrupted_and_unreadable_are_told_apart() {
 }
 
 #[test]
-fn a_genome_in_chunks_is_the_genome_whole() {
+fn a_genome_written_in_chunks_equals_the_genome_written_at_once() {
     type Flash = MockFlash<8, 256>;
     let room = &mut Buffer::new();
     let genome = container(Topology::default(), 1);
@@ -602,7 +603,7 @@ fn whole_bytes(flash: &impl NorFlash) -> usize {
 }
 
 #[test]
-fn chunks_out_of_place_are_refused_and_the_update_goes_on() {
+fn chunks_at_a_wrong_offset_are_refused_and_the_update_continues() {
     type Flash = MockFlash<4, 256>;
     let room = &mut Buffer::new();
     let genome = container(Topology::default(), 1);
@@ -643,7 +644,7 @@ fn chunks_out_of_place_are_refused_and_the_update_goes_on() {
 }
 
 #[test]
-fn what_is_not_the_announced_genome_is_never_committed() {
+fn a_genome_other_than_the_announced_one_is_never_committed() {
     type Flash = MockFlash<4, 256>;
     let room = &mut Buffer::new();
     let genome = container(Topology::default(), 1);
@@ -679,7 +680,7 @@ fn what_is_not_the_announced_genome_is_never_committed() {
 }
 
 #[test]
-fn a_container_takes_a_write_a_block_and_none_that_is_empty() {
+fn a_container_takes_one_write_per_block_and_no_empty_write() {
     type Flash = MockFlash<4, 4096>;
     let room = &mut Buffer::new();
     let mut whole_blocks = 0;
@@ -696,7 +697,7 @@ fn a_container_takes_a_write_a_block_and_none_that_is_empty() {
             let mut slots = Slots::open(Flash::new(), Flash::OFFSET, room).unwrap();
             assert_eq!(slots.write(genome, room), Ok(1));
             let blocks = genome.len().div_ceil(BLOCK_BYTES) as u64;
-            // The header before them, the commit record behind.
+            // Plus the header before them and the commit record after them.
             assert_eq!(slots.release().counts.writes, 1 + blocks + 1);
         }
     }

@@ -1,9 +1,9 @@
-//! Damage: robots of a rectangle are removed or put elsewhere, and the run goes on from there
-//! (paper, Sec. 3.4, Algs. 1 and 2).
+//! Damage: the robots in a rectangle are removed or repositioned, and the run continues (paper,
+//! Sec. 3.4, Algs. 1 and 2).
 //!
-//! The run after the damage is an ordinary one of T steps: network states, last actions and
-//! predictions are as at a start. So damage gives a scenario and a trial, which
-//! [`run`](crate::evaluation::run) takes.
+//! The run after the damage is an ordinary run of T steps: network states, last actions and
+//! predictions are reset. So [`Damage::trial`] returns a scenario and a trial for
+//! [`run`](crate::evaluation::run).
 
 use crate::noise::NoiseStream;
 use crate::scenario::{Scenario, ScenarioError, Trial, random_poses_among};
@@ -11,7 +11,7 @@ use crate::seed::{Purpose, SeedTree, Stream};
 use crate::torus::{Grid, Pose};
 use crate::world::{WorldError, check_poses};
 
-/// A rectangle of cells on a torus, its corners included.
+/// A rectangle of cells on a torus, corners included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Area {
     grid: Grid,
@@ -19,8 +19,9 @@ pub struct Area {
     to: (u16, u16),
 }
 
-/// This damage cannot be done.
+/// The damage cannot be applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DamageError {
     /// A corner of the area is not on the grid.
     #[error("the area's corner ({x}, {y}) is outside the {grid} grid")]
@@ -32,7 +33,7 @@ pub enum DamageError {
         /// The grid.
         grid: Grid,
     },
-    /// The area is on another grid than the swarm.
+    /// Area and swarm are on different grids.
     #[error("the area is on a {area} grid, the swarm on a {swarm} grid")]
     OtherGrid {
         /// Grid of the area.
@@ -40,7 +41,7 @@ pub enum DamageError {
         /// Grid of the swarm.
         swarm: Grid,
     },
-    /// There is no room outside the area.
+    /// There are too few free cells outside the area.
     #[error("{robots} robots to reposition, but {free} free cells outside the area")]
     NoRoom {
         /// Robots in the area.
@@ -48,20 +49,20 @@ pub enum DamageError {
         /// Free cells outside the area.
         free: u32,
     },
-    /// The swarm cannot stand like this.
+    /// The poses do not fit the grid.
     #[error(transparent)]
     World(#[from] WorldError),
-    /// No robot is left, so that there is nothing to run.
+    /// No robot is left.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
 }
 
 impl Area {
-    /// The cells from x0 to x1 and from y0 to y1, ends included. x0 > x1 goes across the eastern
-    /// edge, y0 > y1 across the northern.
+    /// The cells from x0 to x1 and from y0 to y1, ends included. If x0 > x1 the area extends across
+    /// the eastern edge, if y0 > y1 across the northern edge.
     ///
     /// # Errors
-    /// [`DamageError::CornerOutside`] unless both corners are on the grid.
+    /// [`DamageError::CornerOutside`] if a corner is not on the grid.
     pub fn new(grid: Grid, x0: u32, y0: u32, x1: u32, y1: u32) -> Result<Self, DamageError> {
         let corner = |x: u32, y: u32| {
             if x < grid.width().into() && y < grid.height().into() {
@@ -77,7 +78,7 @@ impl Area {
         })
     }
 
-    /// Whether the area has the cell (x, y).
+    /// Whether the area contains the cell (x, y).
     #[must_use]
     pub fn contains(self, x: u16, y: u16) -> bool {
         let within = |at: u16, from: u16, to: u16| {
@@ -97,22 +98,22 @@ impl Area {
     }
 }
 
-/// What is done to the robots of an area.
+/// What happens to the robots in an area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Damage {
-    /// They are taken away (Alg. 1).
+    /// They are removed (Alg. 1).
     Remove(Area),
-    /// They are put on uniformly drawn free cells outside the area, with new headings (Alg. 2).
+    /// They are placed on uniformly drawn free cells outside the area, with new headings (Alg. 2).
     Reposition(Area),
 }
 
 impl Damage {
-    /// The swarm after the damage. The robots that were not in the area keep their order and
-    /// places; repositioned ones come after them, in index order. Removing draws nothing.
+    /// The swarm after the damage. The robots outside the area keep their order and poses;
+    /// repositioned robots follow them, in index order. Removal draws no random numbers.
     ///
     /// # Errors
-    /// [`DamageError`] if the area is on another grid, the poses do not fit the grid, or robots to
-    /// reposition have no room.
+    /// [`DamageError`] if the area is on another grid, the poses do not fit the grid, or there are
+    /// too few free cells for the robots to reposition.
     pub fn apply(
         self,
         grid: Grid,
@@ -143,12 +144,12 @@ impl Damage {
         Ok(left)
     }
 
-    /// The run after the damage: its scenario, with as many robots as are left, and its trial.
-    /// Poses come from the seed tree's [`Purpose::Damage`], noise from [`Purpose::DamageNoise`],
-    /// both of the repetition.
+    /// The run after the damage: its scenario, with the number of robots left, and its trial. Poses
+    /// come from the seed tree's [`Purpose::Damage`], noise from [`Purpose::DamageNoise`], both of
+    /// the repetition.
     ///
     /// # Errors
-    /// As [`Damage::apply`]; and [`DamageError::Scenario`] if no robot is left.
+    /// Those of [`Damage::apply`], and [`DamageError::Scenario`] if no robot is left.
     pub fn trial(
         self,
         scenario: &Scenario,
@@ -227,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rectangle_may_go_across_the_edge() {
+    fn a_rectangle_may_extend_across_the_edge() {
         assert_removed(
             (3, 3, 0, 0),
             "▶▶▶▶▶
@@ -253,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn repositioned_robots_stand_outside_after_the_others() {
+    fn repositioned_robots_are_outside_the_area_and_follow_the_others() {
         let (grid, poses) = parse("▶·▶··\n·▲·▲·\n▶▶▶▶▶\n·····").unwrap();
         let area = Area::new(grid, 4, 1, 1, 2).unwrap();
         let mut placed = std::collections::BTreeMap::new();
@@ -315,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn the_run_after_damage_starts_as_any_run_with_the_robots_left() {
+    fn the_run_after_damage_is_an_ordinary_run_of_the_robots_left() {
         let (grid, poses) = parse("▶▶▶▶\n····\n▲▲▲▲\n····").unwrap();
         let scenario = Scenario::new(grid, 8, 30, NoiseRate::new(0.1).unwrap()).unwrap();
         let area = Area::new(grid, 0, 3, 1, 3).unwrap();

@@ -1,4 +1,4 @@
-//! Swarms as text: one character a cell, north at the top.
+//! Swarms as text: one character per cell, north at the top.
 
 use crate::torus::{Grid, Heading, Pose};
 
@@ -13,7 +13,7 @@ pub fn arrow(heading: Heading) -> char {
     }
 }
 
-/// The hollow arrow of a heading, for robots that others are to stand out from.
+/// The hollow arrow of a heading, for robots that are not highlighted.
 #[must_use]
 pub fn hollow_arrow(heading: Heading) -> char {
     match heading {
@@ -27,7 +27,7 @@ pub fn hollow_arrow(heading: Heading) -> char {
 /// An empty cell.
 pub const EMPTY: char = '·';
 
-/// Draws a swarm, one line a row, the northernmost first.
+/// Draws a swarm, one line per row, the northernmost first.
 #[must_use]
 pub fn draw(grid: Grid, poses: &[Pose]) -> String {
     draw_members(grid, poses, |_| true)
@@ -50,8 +50,9 @@ pub fn draw_members(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool)
     rows.join("\n")
 }
 
-/// A drawing does not describe a swarm.
+/// The drawing does not describe a swarm.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DrawingError {
     /// Rows of different lengths.
     #[error("line {line} has {found} cells, the first row {expected}")]
@@ -77,7 +78,7 @@ pub enum DrawingError {
 }
 
 /// Reads a drawing back: the grid, and the poses row by row from the south, each from the west.
-/// Filled and hollow arrows are robots alike; spaces and empty lines are skipped.
+/// Filled and hollow arrows both stand for robots; spaces and empty lines are skipped.
 ///
 /// # Errors
 /// [`DrawingError`] says which line is wrong.
@@ -111,7 +112,7 @@ pub fn parse(drawing: &str) -> Result<(Grid, Vec<Pose>), DrawingError> {
     Ok((grid, poses))
 }
 
-/// What a character draws: a robot or none; nothing if it is not a cell.
+/// The heading of the robot that a character stands for, or no robot; `None` if it is not a cell.
 fn cell(drawn: char) -> Option<Option<Heading>> {
     let of = |heading: &Heading| arrow(*heading) == drawn || hollow_arrow(*heading) == drawn;
     match Heading::ALL.into_iter().find(of) {
@@ -125,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_drawing_is_read_back_as_it_was_drawn() {
+    fn a_drawing_is_read_back_unchanged() {
         let drawing = "▶··\n·▲◀\n··▼\n···";
         let (grid, poses) = parse(drawing).unwrap();
         assert_eq!((grid.width(), grid.height()), (3, 4));
@@ -134,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn robots_that_are_no_members_are_drawn_hollow() {
+    fn robots_that_are_not_members_are_drawn_hollow() {
         let (grid, poses) = parse("▶▲·\n··◀\n▼··").unwrap();
         let drawing = draw_members(grid, &poses, |robot| robot % 2 == 0);
         assert_eq!(drawing, "▶△·\n··◁\n▼··");
@@ -143,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_with_spaces_and_hollow_arrows_are_read_too() {
+    fn drawings_with_spaces_and_hollow_arrows_are_read_too() {
         let (grid, poses) = parse("  ▶ · △\n\n  · ▼ ·\n  ◁ · ·\n").unwrap();
         assert_eq!(draw(grid, &poses), "▶·▲\n·▼·\n◀··");
     }

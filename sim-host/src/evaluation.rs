@@ -1,6 +1,6 @@
 //! Evaluation: how well a swarm predicts, over one run and over the repetitions of a generation.
 //!
-//! Fitness (paper, Eq. 1) is held as the integer number of matches: bits that were as predicted
+//! Fitness (paper, Eq. 1) is stored as the number of matches: bits that were predicted correctly
 //! one step before. A genome's fitness is the smallest over its repetitions.
 
 use crate::metrics::{Measures, Motion};
@@ -15,18 +15,18 @@ use minimal_surprise_controller::{Controller, Genome};
 pub struct Evaluation {
     /// Matches of the worst repetition.
     pub matches: u64,
-    /// The worst repetition; of equals, the first.
+    /// The worst repetition; the first of several.
     pub worst_repetition: u32,
 }
 
-/// What one run came to.
+/// The result of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcome {
-    /// Bits that were as predicted.
+    /// Bits predicted correctly.
     pub matches: u64,
     /// Bits sensed.
     pub scored_bits: u64,
-    /// How often each sensor was predicted occupied, in the predictions so scored.
+    /// How often each sensor was predicted occupied, counting only scored predictions.
     pub predicted_occupied: Vec<u64>,
     /// Poses at the end.
     pub final_poses: Vec<Pose>,
@@ -52,7 +52,7 @@ impl Outcome {
     }
 }
 
-/// Runs a genome from a trial's start for the scenario's steps, showing every step to `observe`.
+/// Runs a genome from a trial's start for the scenario's steps, calling `observe` after every step.
 ///
 /// # Errors
 /// [`WorldError`] if the trial's poses do not fit the grid.
@@ -84,7 +84,7 @@ pub fn run(
     })
 }
 
-/// How the robots of one trial move, and where they end.
+/// Returns how the robots of one trial move, and their final poses.
 ///
 /// # Panics
 /// If the trial's poses do not fit the grid.

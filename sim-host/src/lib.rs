@@ -1,14 +1,4 @@
-//! The torus grid world in which swarms of minimal-surprise robots live.
-//!
-//! Robots sense, decide by calling the controller crate, and act in index order. An evaluation is
-//! a pure function of genome, scenario and seed: no clock, no thread and no memory layout enters
-//! a result.
-//!
-//! Data flows one way: [`torus`] → [`seed`] → [`noise`] → [`world`] → [`scenario`] → [`evaluation`] →
-//! [`trace`] → [`metrics`] → [`structures`]. [`damage`] turns a final state into a new start;
-//! [`exchange`] reads and writes the text files of the authors' program; [`drawing`] draws swarms
-//! as text. [`engine`] computes the same evaluations faster, and is the only place with unsafe
-//! code: its folder `x86`.
+#![doc = include_str!("../README.md")]
 #![deny(unsafe_code)]
 
 pub mod damage;

@@ -1,10 +1,10 @@
 //! Measures of a run: how well a swarm predicts, how much it moves, and how much of an earlier
-//! structure it kept.
+//! structure it keeps.
 //!
-//! [`Measures`] watches a run step by step and keeps a few numbers a step and a robot, so that a
-//! million robots need no trace; [`Measures::of_trace`] gives the same numbers for a recorded run.
-//! N is the number of robots present, R the number of sensors, T the number of steps seen.
-//! Everything is counted in integers and divided once, when asked for.
+//! [`Measures`] observes a run step by step and keeps a few numbers per step and per robot, so that
+//! a million robots need no trace; [`Measures::of_trace`] computes the same numbers for a recorded
+//! run. N is the number of robots present, R the number of sensors, T the number of steps seen.
+//! Everything is counted in integers and divided once, in the functions that return a measure.
 
 use crate::torus::{Grid, Pose};
 use crate::trace::Trace;
@@ -13,18 +13,18 @@ use minimal_surprise_controller::sensor::MAX_SENSORS;
 use minimal_surprise_controller::{Action, Decision, SensorBits, SensorModel, Topology};
 use std::collections::BTreeSet;
 
-/// How much the robots of a run moved and meant to.
+/// How much the robots of a run moved and intended to move.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Motion {
     grid: Grid,
     robots: u32,
-    /// Of each step: robots that moved, and robots that went straight.
+    /// Per step: robots that moved, and robots that chose to go straight.
     moved: Vec<u32>,
     straight: Vec<u32>,
 }
 
 impl Motion {
-    /// A run of so many robots, no step done yet.
+    /// A run of `robots` robots before its first step.
     #[must_use]
     pub fn new(grid: Grid, robots: u32) -> Self {
         Self {
@@ -35,7 +35,8 @@ impl Motion {
         }
     }
 
-    /// Takes in a step: robots that moved, and robots that went straight whether they could or not.
+    /// Adds a step: the number of robots that moved, and of those that chose to go straight,
+    /// blocked or not.
     pub fn add_step(&mut self, moved: u32, straight: u32) {
         self.moved.push(moved);
         self.straight.push(straight);
@@ -48,7 +49,7 @@ impl Motion {
     }
 
     /// Temperature T(t) = Mₓ(t) + M_y(t) of each step, with Mₓ(t) = 1/N Σₙ |xₙ(t) − xₙ(t+1)|, in
-    /// cells a step and robot, from 0 to 1. A move across the edge is one cell (paper, Eqs. 2–3).
+    /// cells per step and robot, from 0 to 1. A move across the edge is one cell (paper, Eqs. 2–3).
     #[must_use]
     pub fn temperature(&self) -> Vec<f64> {
         let moved = self.moved.iter();
@@ -57,15 +58,15 @@ impl Motion {
             .collect()
     }
 
-    /// Robot movement M = 1/τ Σ T(t) over the last τ steps, in cells a step and robot, from 0 to 1
-    /// (paper, Eq. 4). τ is [`Motion::period`].
+    /// Robot movement M = 1/τ Σ T(t) over the last τ steps, in cells per step and robot, from 0 to
+    /// 1 (paper, Eq. 4). τ is [`Motion::period`].
     #[must_use]
     pub fn movement(&self) -> f64 {
         self.mean_over_period(&self.moved)
     }
 
     /// Intended robot movement I = 1/(N·τ) Σₙ Σₜ aₙ(t) over the last τ steps, aₙ(t) = 1 for a robot
-    /// that went straight whether it could or not, in cells a step and robot, from 0 to 1 (paper,
+    /// that chose to go straight, blocked or not, in cells per step and robot, from 0 to 1 (paper,
     /// Eq. 5; its a is 1 where the networks' action value is 0). I ≥ M. τ is [`Motion::period`].
     #[must_use]
     pub fn intended_movement(&self) -> f64 {
@@ -87,25 +88,42 @@ impl Motion {
     }
 }
 
-/// What is known of a run after the steps seen so far.
+/// The measures of a run after the steps observed so far.
+///
+/// ```
+/// use minimal_surprise_controller::{Controller, Genome, Topology};
+/// use minimal_surprise_sim::{Grid, Measures, NoiseRate, Scenario, SeedTree, run};
+///
+/// let topology = Topology::default();
+/// let controller = Controller::new(&Genome::zeroed(topology));
+/// let scenario = Scenario::new(Grid::new(15, 15)?, 100, 50, NoiseRate::NONE)?;
+/// let trial = scenario.trial(SeedTree::new(1), 0, 0);
+///
+/// let mut measures = Measures::starting_from(scenario.grid(), topology, &trial.starts);
+/// let outcome = run(&controller, &scenario, &trial, |world| measures.observe(world))?;
+/// assert_eq!(measures.fitness(), outcome.fitness());
+/// // A zeroed genome only turns.
+/// assert_eq!(measures.movement(), 0.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Measures {
     grid: Grid,
     model: SensorModel,
     poses: Vec<Pose>,
     predictions: Vec<SensorBits>,
-    /// Of each robot, bits mispredicted in the last step.
+    /// Bits mispredicted in the last step, per robot.
     mispredicted_now: Vec<u8>,
     motion: Motion,
-    /// Of each step: bits mispredicted.
+    /// Bits mispredicted, per step.
     mispredicted: Vec<u64>,
     mispredicted_so_far: u64,
-    /// Of each sensor, how often it was predicted occupied.
+    /// How often each sensor was predicted occupied.
     predicted_occupied: [u64; MAX_SENSORS],
 }
 
 impl Measures {
-    /// A run that starts from these poses, no step done yet.
+    /// A run before its first step, with these starting poses.
     #[must_use]
     pub fn starting_from(grid: Grid, topology: Topology, starts: &[Pose]) -> Self {
         Self {
@@ -121,10 +139,10 @@ impl Measures {
         }
     }
 
-    /// Takes in the step that the world has just done.
+    /// Adds the last step of the world.
     ///
     /// # Panics
-    /// If the world has another number of robots.
+    /// If the world has a different number of robots.
     pub fn observe(&mut self, world: &World) {
         self.take_in(world.poses(), world.readings(), world.decisions());
     }
@@ -141,7 +159,7 @@ impl Measures {
         measures
     }
 
-    /// Takes in the steps of a trace, showing the state after each to `observe`.
+    /// Adds the steps of a trace, calling `observe` after each.
     fn replay(&mut self, trace: &Trace, mut observe: impl FnMut(&Self)) {
         let after = trace.steps.iter().skip(1).map(|step| &step.poses);
         let after = after.chain([&trace.final_poses]);
@@ -151,15 +169,15 @@ impl Measures {
         }
     }
 
-    /// One step: the poses after it, and what was sensed and decided in it.
+    /// Adds one step: the poses after it, and what was sensed and decided in it.
     fn take_in(&mut self, poses: &[Pose], readings: &[SensorBits], decisions: &[Decision]) {
         let robots = self.poses.len();
         assert!(
             [poses.len(), readings.len(), decisions.len()] == [robots; 3],
             "the number of robots does not change during a run"
         );
-        // A robot moves by at most one cell a step, so that the distance is 0 or 1, also across
-        // the edge.
+        // A robot moves by at most one cell per step, so the distance is 0 or 1, also across the
+        // edge.
         let moved = self.poses.iter().zip(poses);
         let moved = moved.filter(|(from, to)| (from.x, from.y) != (to.x, to.y));
         let straight = decisions.iter().filter(|d| d.action == Action::Straight);
@@ -209,7 +227,7 @@ impl Measures {
     }
 
     /// Average prediction of each sensor, 1/(N·T) Σₜ Σₙ pₙʳ(t), from 0 (always empty) to 1 (always
-    /// occupied), of the predictions that count for the fitness (paper, Fig. 9).
+    /// occupied), over the predictions that count towards fitness (paper, Fig. 9).
     #[must_use]
     pub fn average_prediction(&self) -> Vec<f64> {
         let readings = self.robots() * u64::from(self.steps());
@@ -288,7 +306,7 @@ pub fn surprise_over_time(grid: Grid, topology: Topology, trace: &Trace) -> Vec<
     rows
 }
 
-/// What a robot of one state has in common with a robot of another to count as a match.
+/// What a robot of one state must share with a robot of another to count as a match.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Match {
     /// Cell and heading.
@@ -297,9 +315,9 @@ pub enum Match {
     Cell,
 }
 
-/// Similarity S = 1/N Σ m(pᵢ) over the robots of the later state, from 0 to 1: m is 1 where the
-/// earlier state, the undamaged final one, has a robot on the same cell and, unless `matching` says
-/// otherwise, with the same heading. N is the number of robots of the earlier state, so that
+/// Similarity S = 1/N Σ m(pᵢ) over the robots of the later state, from 0 to 1: m is 1 if the
+/// earlier state (the final state before the damage) has a robot on the same cell and, with
+/// [`Match::Pose`], with the same heading. N is the number of robots of the earlier state, so that
 /// removed robots lower S; 0 if there were none (paper, Eqs. 6–7).
 #[must_use]
 pub fn similarity(after: &[Pose], before: &[Pose], matching: Match) -> f64 {
@@ -315,7 +333,7 @@ pub fn similarity(after: &[Pose], before: &[Pose], matching: Match) -> f64 {
     ratio(matches.count() as u64, before.len() as u64)
 }
 
-/// A quotient; 0 of nothing.
+/// A quotient; 0 if the divisor is 0.
 fn ratio(part: u64, whole: u64) -> f64 {
     part as f64 / whole.max(1) as f64
 }
@@ -334,7 +352,7 @@ mod tests {
         Topology::new(SensorModel::A, prediction).unwrap()
     }
 
-    /// Runs a drawn world on given decisions: one row a step, one decision a robot.
+    /// Runs a drawn world with given decisions: one row per step, one decision per robot.
     fn driven(drawing: &str, topology: Topology, steps: &[Vec<Decision>]) -> (Measures, Trace) {
         let (grid, starts) = parse(drawing).unwrap();
         let controller = Controller::new(&Genome::zeroed(topology));
@@ -372,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn fitness_is_the_share_of_bits_as_predicted() {
+    fn fitness_is_the_share_of_correctly_predicted_bits() {
         // t = 0: nothing is expected, each robot has 7 of 8 bits right; t = 1: 8 and 7.
         // F = (7 + 7 + 8 + 7) / (2 robots · 2 steps · 8 sensors) = 29/32.
         let (measures, _) = facing_pair(Prediction::Free);
@@ -383,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn average_prediction_is_over_the_predictions_that_are_scored() {
+    fn average_prediction_covers_the_scored_predictions() {
         // Bit 0 is expected by none of two robots at t = 0 and by one at t = 1: 1 of 4. What they
         // predict in the last step is never compared.
         let (measures, _) = facing_pair(Prediction::Free);
@@ -394,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn surprise_is_the_share_of_bits_not_as_predicted() {
+    fn surprise_is_the_share_of_mispredicted_bits() {
         // t = 0: one of 8 bits for each robot; t = 1: none for the first, one for the second.
         let (measures, trace) = facing_pair(Prediction::Free);
         let over_time = surprise_over_time(
@@ -437,7 +455,7 @@ mod tests {
     }
 
     #[test]
-    fn movement_is_the_mean_temperature_of_the_last_half_as_many_steps_as_cells() {
+    fn movement_is_the_mean_temperature_over_half_as_many_steps_as_cells() {
         // τ = ⌈9/2⌉ = 5, t = 2 to 6: M = (0.25 + 4 · 0.5) / 5 = 0.45.
         let measures = busy();
         assert_eq!(measures.period(), 5);
@@ -452,7 +470,7 @@ mod tests {
     }
 
     #[test]
-    fn the_period_is_that_of_the_paper_and_at_most_the_run() {
+    fn the_period_is_that_of_the_paper_and_at_most_the_run_length() {
         let period = |side, steps: usize| {
             let grid = Grid::new(side, side).unwrap();
             let mut measures = Measures::starting_from(grid, Topology::default(), &[]);
@@ -481,7 +499,7 @@ mod tests {
     }
 
     #[test]
-    fn similarity_is_the_share_of_the_original_robots_found_again() {
+    fn similarity_is_the_share_of_the_original_robots_that_are_found_again() {
         let before = parse("▶▶◀·\n····\n▲··▼").unwrap().1;
         // Of five robots, the southern two and one of the line are as before, one has turned, and
         // one is gone: 3/5 with headings, 4/5 without.
@@ -489,7 +507,7 @@ mod tests {
         assert_eq!(similarity(&after, &before, Match::Pose), 0.6);
         assert_eq!(similarity(&after, &before, Match::Cell), 0.8);
         assert_eq!(similarity(&before, &before, Match::Pose), 1.0);
-        // Which robot it is does not matter.
+        // It does not matter which robot it is.
         let renumbered: Vec<Pose> = before.iter().rev().copied().collect();
         assert_eq!(similarity(&renumbered, &before, Match::Pose), 1.0);
         assert_eq!(similarity(&[], &before, Match::Cell), 0.0);

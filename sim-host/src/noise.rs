@@ -5,14 +5,14 @@
 //! generation, repetition, step and robot. The ChaCha8 key names the first three (see
 //! [`seed`](crate::seed)), the ChaCha stream number is the step, and robot n's words start at word
 //! 8·n: sixteen draws of 16 bits, of which sensor k takes number k (low half of a word first) and
-//! flips where it is below the rate; draws that the model has no sensor for flip nothing. So no
-//! engine, order or thread changes it, and all genomes of a generation meet the same noise.
+//! flips if it is below the rate; draws without a sensor flip nothing. So the noise does not depend
+//! on engine, order or thread, and all genomes of a generation get the same noise.
 
 use crate::seed::Stream;
 use minimal_surprise_controller::SensorBits;
 use rand_core::Rng as _;
 
-/// Words of 32 bits that each robot has in each step.
+/// Number of 32-bit words per robot and step.
 const WORDS_PER_ROBOT: u128 = 8;
 
 /// Probability that a bit is flipped, in units of 1/65,536.
@@ -66,13 +66,14 @@ impl NoiseStream {
         self.rate
     }
 
-    /// The ChaCha8 key of the stream, for those who draw it again elsewhere.
+    /// The ChaCha8 key of the stream, from which another program can draw the same noise.
     #[must_use]
     pub fn key(&self) -> [u8; 32] {
         self.stream.get_seed()
     }
 
-    /// Flips the readings of all robots in one step, robot 0 first, in the bits of `sensors` only.
+    /// Flips bits in the readings of all robots in one step, robot 0 first, but only the bits of
+    /// `sensors`.
     pub fn flip(&mut self, step: u32, sensors: SensorBits, readings: &mut [SensorBits]) {
         if self.rate.is_none() {
             return;
@@ -84,8 +85,8 @@ impl NoiseStream {
         }
     }
 
-    /// The sixteen draws of one robot in one step: a bit is set where the draw is below the rate,
-    /// whether or not a sensor takes it.
+    /// The sixteen draws of one robot in one step: a bit is set if the draw is below the rate,
+    /// whether or not there is a sensor for it.
     #[must_use]
     pub fn draws(&mut self, step: u32, robot: u32) -> u16 {
         self.stream.set_stream(step.into());
@@ -125,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn flips_do_not_depend_on_the_order_of_asking() {
+    fn flips_do_not_depend_on_the_order_of_the_calls() {
         let mut readings = [SensorBits::NONE; 37];
         noise(0.3).flip(9, ALL, &mut readings);
         let mut other = noise(0.3);
@@ -135,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_flips_no_bit_that_the_model_has_no_sensor_for() {
+    fn noise_flips_no_bit_without_a_sensor() {
         for model in SensorModel::ALL {
             let mut readings = [SensorBits::NONE; 50];
             noise(0.5).flip(3, model.mask(), &mut readings);
@@ -166,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn rates_are_taken_to_the_nearest_65_536th_and_refused_outside_0_and_1() {
+    fn rates_are_rounded_to_the_nearest_65_536th_and_refused_outside_0_and_1() {
         assert_eq!(NoiseRate::new(0.1).unwrap().per_65_536(), 6554);
         for probability in [-0.01, 1.01, f64::NAN, f64::INFINITY] {
             assert_eq!(NoiseRate::new(probability), None);

@@ -1,10 +1,27 @@
-//! Scenarios: what a swarm is put into, and the trials of a generation.
+//! Scenarios: the conditions of a run, and the trials of a generation.
 
 use crate::noise::{NoiseRate, NoiseStream};
 use crate::seed::{Purpose, SeedTree, Stream, uniform_below};
 use crate::torus::{Grid, Heading, Pose};
 
-/// The conditions of a run, whatever the genome.
+/// The conditions of a run, independent of the genome.
+///
+/// ```
+/// use minimal_surprise_sim::{Grid, NoiseRate, Scenario, ScenarioError, SeedTree};
+///
+/// let grid = Grid::new(11, 18)?;
+/// let scenario = Scenario::new(grid, 100, 500, NoiseRate::NONE)?;
+/// assert_eq!(scenario.scored_bits(14), 100 * 500 * 14);
+///
+/// let seeds = SeedTree::new(1);
+/// let trial = scenario.trial(seeds, 0, 0);
+/// assert_eq!(trial.starts.len(), 100);
+/// assert_ne!(trial.starts, scenario.trial(seeds, 0, 1).starts);
+///
+/// let too_many = Scenario::new(grid, 199, 500, NoiseRate::NONE);
+/// assert_eq!(too_many, Err(ScenarioError::RobotsDoNotFit { robots: 199, grid }));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scenario {
     grid: Grid,
@@ -13,10 +30,11 @@ pub struct Scenario {
     noise: NoiseRate,
 }
 
-/// No swarm can be put into this.
+/// The scenario is not valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ScenarioError {
-    /// No robot, or more than cells.
+    /// There is no robot, or there are more robots than cells.
     #[error("{robots} robots on a {grid} grid; from 1 to {} fit", grid.cells())]
     RobotsDoNotFit {
         /// Robots asked for.
@@ -24,7 +42,7 @@ pub enum ScenarioError {
         /// The grid.
         grid: Grid,
     },
-    /// No step at all.
+    /// There is no step.
     #[error("0 steps; at least 1 is needed")]
     NoSteps,
 }
@@ -33,7 +51,7 @@ impl Scenario {
     /// A swarm of `robots` on `grid` for `steps`.
     ///
     /// # Errors
-    /// [`ScenarioError`] unless there is a robot, every robot has a cell and there is a step.
+    /// [`ScenarioError`] if there is no robot, no step, or fewer cells than robots.
     pub fn new(
         grid: Grid,
         robots: u32,
@@ -94,8 +112,8 @@ impl Scenario {
         }
     }
 
-    /// A start of a re-evaluation: new starting poses and noise, the same for every genome, that
-    /// no generation has met.
+    /// A start of a re-evaluation: new starting poses and noise that no generation has used, the
+    /// same for every genome.
     #[must_use]
     pub fn reevaluation(&self, seeds: SeedTree, start: u32) -> Trial {
         let stream = |purpose| seeds.stream(purpose, 0, start);
@@ -112,14 +130,14 @@ impl Scenario {
 pub struct Trial {
     /// Starting poses, in index order.
     pub starts: Vec<Pose>,
-    /// The noise met.
+    /// Sensor noise.
     pub noise: NoiseStream,
 }
 
 /// Poses on uniformly drawn free cells, with uniform headings.
 ///
-/// Each robot in turn draws one of the cells still free, by its place in a list from which drawn
-/// cells are swapped to the end, then its heading.
+/// Each robot in turn draws one of the cells still free, as an index into a list, then its heading.
+/// The last cell of the list replaces a drawn cell.
 ///
 /// # Panics
 /// If there are more robots than cells.

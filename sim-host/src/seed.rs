@@ -1,16 +1,16 @@
-//! The seed tree: every random stream of a run, named by what it is for.
+//! The seed tree: every random stream of a run, named by its purpose.
 //!
 //! A stream is a ChaCha8 generator whose 256-bit key is the four numbers run seed, purpose,
-//! generation and index, 64 bits each, little-endian. Streams are independent of each other, of
-//! the number of threads and of the order of work.
+//! generation and index, 64 bits each, little-endian. Streams do not depend on each other, on the
+//! number of threads or on the order of work.
 
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
 
-/// The generator of every stream, by name, because results depend on it.
+/// The generator of every stream. Results depend on it.
 pub type Stream = ChaCha8Rng;
 
-/// What a stream is drawn for. The numbers are part of every result: they never change.
+/// The purpose of a stream. The numbers are part of every result and never change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u64)]
 pub enum Purpose {
@@ -28,11 +28,12 @@ pub enum Purpose {
     ReevaluationStarts = 6,
     /// Sensor noise of a re-evaluation; generation: 0, index: start.
     ReevaluationNoise = 7,
-    /// New poses of repositioned robots; generation: 0, index: repetition of the damage.
+    /// New poses of repositioned robots; generation: 0, index: repetition of the damage experiment.
     Damage = 8,
-    /// Sensor noise after damage; generation: 0, index: repetition of the damage.
+    /// Sensor noise after damage; generation: 0, index: repetition of the damage experiment.
     DamageNoise = 9,
-    /// Crossover of a genome: whether, with whom, and which weights; index: slot of the genome.
+    /// Crossover of a genome: whether it happens, the second parent and the weights; index: slot of
+    /// the genome.
     Crossover = 10,
 }
 

@@ -1,10 +1,11 @@
-//! Geometry: the grid, headings and poses. x grows east, y grows north; the edges are joined.
+//! Geometry: the grid, headings and poses. x increases to the east, y to the north; opposite edges
+//! are joined.
 
 use minimal_surprise_controller::Turn;
 use minimal_surprise_controller::sensor::Cell;
 use serde::{Deserialize, Serialize};
 
-/// Shortest side: below it a robot would sense itself.
+/// Shortest side: on a shorter one a robot would sense itself.
 pub const SIDE_MIN: u32 = 3;
 /// Longest side.
 pub const SIDE_MAX: u32 = 16_384;
@@ -16,7 +17,7 @@ pub struct Grid {
     height: u16,
 }
 
-/// No grid of these sides can be built.
+/// A side of the grid is too short or too long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a grid of {width}x{height}; each side must be from {SIDE_MIN} to {SIDE_MAX} cells")]
 pub struct GridError {
@@ -30,7 +31,7 @@ impl Grid {
     /// A torus of `width` × `height` cells.
     ///
     /// # Errors
-    /// [`GridError`] unless both sides are within [`SIDE_MIN`] and [`SIDE_MAX`].
+    /// [`GridError`] if a side is not within [`SIDE_MIN`] and [`SIDE_MAX`].
     pub fn new(width: u32, height: u32) -> Result<Self, GridError> {
         let sides = SIDE_MIN..=SIDE_MAX;
         if sides.contains(&width) && sides.contains(&height) {
@@ -67,7 +68,7 @@ impl Grid {
         u32::from(y) * u32::from(self.width) + u32::from(x)
     }
 
-    /// The cell (x, y) moved by (dx, dy) across the edges, for any distance.
+    /// The cell (dx, dy) from the cell (x, y), across the edges and at any distance.
     #[must_use]
     pub fn moved(self, x: u16, y: u16, dx: i32, dy: i32) -> (u16, u16) {
         let along = |from: u16, by: i32, side: u16| {
@@ -83,7 +84,7 @@ impl core::fmt::Display for Grid {
     }
 }
 
-/// Direction that a robot faces.
+/// The direction that a robot faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(into = "u8", try_from = "u8")]
 #[repr(u8)]
@@ -131,7 +132,7 @@ impl Heading {
         Self::ALL[(bits & 3) as usize]
     }
 
-    /// After a quarter turn.
+    /// The heading after a quarter turn.
     #[must_use]
     pub fn turned(self, turn: Turn) -> Self {
         Self::from_low_bits(match turn {
@@ -151,7 +152,7 @@ impl Heading {
         }
     }
 
-    /// Where a sensed cell lies, as (dx, dy), for a robot of this heading.
+    /// The offset (dx, dy) of a sensed cell from a robot with this heading.
     #[must_use]
     pub fn offset(self, cell: Cell) -> (i32, i32) {
         let (ahead_x, ahead_y) = self.ahead();

@@ -25,7 +25,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// A trace that starts from the world as it is now.
+    /// An empty trace that starts from the current state of the world.
     #[must_use]
     pub fn starting_from(world: &World) -> Self {
         Self {
@@ -34,7 +34,7 @@ impl Trace {
         }
     }
 
-    /// Adds the step that the world has just done.
+    /// Adds the last step of the world.
     pub fn record(&mut self, world: &World) {
         let before = core::mem::replace(&mut self.final_poses, world.poses().to_vec());
         self.steps.push(TraceStep {

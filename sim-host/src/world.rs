@@ -1,9 +1,9 @@
 //! The world: a swarm on a torus, one step at a time.
 //!
-//! A step: every robot senses the occupancy at time t; then, in index order, each decides and
-//! acts. A robot going straight moves if the cell ahead was empty at time t and no robot of a
-//! lower index has taken it; a cell vacated in this step is still blocked. Noise changes what a
-//! robot senses, never whether it may move.
+//! In a step, every robot senses the occupancy at time t; then, in index order, each decides and
+//! acts. A robot going straight moves if the cell ahead was empty at time t and no robot of a lower
+//! index has taken it; a cell vacated in this step is still blocked. Noise changes what a robot
+//! senses, never whether it may move.
 
 use crate::noise::NoiseStream;
 use crate::torus::{Grid, Heading, Pose};
@@ -14,8 +14,9 @@ use std::collections::HashMap;
 /// How far a robot senses, in cells: the width of the border around the board.
 const REACH: usize = 2;
 
-/// A swarm cannot stand like this.
+/// The poses do not fit the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum WorldError {
     /// A robot is outside the grid.
     #[error("robot {robot} is at ({x}, {y}), outside the {grid} grid")]
@@ -48,7 +49,8 @@ pub enum WorldError {
 /// # Errors
 /// [`WorldError`] names the first robot that is wrong.
 pub fn check_poses(grid: Grid, poses: &[Pose]) -> Result<(), WorldError> {
-    // Memory and time go with the robots: a file of few robots may name any grid.
+    // Memory and time depend on the number of robots only: a file with few robots may name any
+    // grid.
     let mut cells = Vec::with_capacity(poses.len());
     for (robot, &Pose { x, y, .. }) in poses.iter().enumerate() {
         if x >= grid.width() || y >= grid.height() {
@@ -60,7 +62,7 @@ pub fn check_poses(grid: Grid, poses: &[Pose]) -> Result<(), WorldError> {
     check_overlap(grid, poses, &mut cells)
 }
 
-/// Checks that no two robots share a cell; `cells` are theirs and are sorted.
+/// Checks that no two robots share a cell; `cells` are the robots' cells and get sorted.
 fn check_overlap(grid: Grid, poses: &[Pose], cells: &mut [u32]) -> Result<(), WorldError> {
     cells.sort_unstable();
     if cells.is_sorted_by(|a, b| a < b) {
@@ -76,6 +78,23 @@ fn check_overlap(grid: Grid, poses: &[Pose], cells: &mut [u32]) -> Result<(), Wo
 }
 
 /// A swarm on a torus.
+///
+/// ```
+/// use minimal_surprise_controller::{Controller, Genome, Topology};
+/// use minimal_surprise_sim::{Grid, NoiseRate, Scenario, SeedTree, World};
+///
+/// let controller = Controller::new(&Genome::zeroed(Topology::default()));
+/// let scenario = Scenario::new(Grid::new(15, 15)?, 100, 500, NoiseRate::NONE)?;
+/// let mut trial = scenario.trial(SeedTree::new(1), 0, 0);
+///
+/// let mut world = World::new(scenario.grid(), &trial.starts, &controller)?;
+/// for _ in 0..4 {
+///     world.step(&controller, &mut trial.noise);
+/// }
+/// // A zeroed genome only turns: after four quarter turns every robot faces its first heading.
+/// assert_eq!(world.poses(), trial.starts);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct World {
     grid: Grid,
@@ -91,7 +110,7 @@ pub struct World {
 }
 
 impl World {
-    /// A swarm at its start: network states, last actions and predictions as before the first step.
+    /// A swarm before its first step.
     ///
     /// # Errors
     /// [`WorldError`] if a robot is outside the grid or two share a cell.
@@ -116,7 +135,7 @@ impl World {
         })
     }
 
-    /// One step of all robots.
+    /// Runs one step of all robots.
     pub fn step(&mut self, controller: &Controller, noise: &mut NoiseStream) {
         self.sense(noise);
         self.decisions.clear();
@@ -126,11 +145,11 @@ impl World {
         self.act();
     }
 
-    /// [`World::step`] with decisions from elsewhere: a recording, or a robot on a line. The
-    /// robots' own states stay as they are.
+    /// [`World::step`] with decisions from another source: a recording, or a robot on a serial
+    /// line. The robots' network states do not change.
     ///
     /// # Panics
-    /// Unless there is one decision a robot.
+    /// If there is not exactly one decision per robot.
     pub fn step_with(
         &mut self,
         noise: &mut NoiseStream,
@@ -141,7 +160,7 @@ impl World {
         assert_eq!(
             self.decisions.len(),
             self.poses.len(),
-            "one decision a robot"
+            "one decision per robot"
         );
         self.act();
     }
@@ -156,7 +175,7 @@ impl World {
         noise.flip(self.step, self.model.mask(), &mut self.readings);
     }
 
-    /// Cells are taken at once and vacated at the end of the step.
+    /// Cells are taken immediately and vacated at the end of the step.
     fn act(&mut self) {
         for (pose, decision) in self.poses.iter_mut().zip(&self.decisions) {
             match decision.action {
@@ -196,7 +215,8 @@ impl World {
         &self.states
     }
 
-    /// What the robots sensed in the last step, noise included; no bit beyond the model's sensors.
+    /// What the robots sensed in the last step, noise included; bits beyond the model's sensors are
+    /// zero.
     #[must_use]
     pub fn readings(&self) -> &[SensorBits] {
         &self.readings
@@ -215,8 +235,8 @@ impl World {
     }
 }
 
-/// Occupancy, a byte a cell, with a border that repeats what lies across the edge, so that sensing
-/// is a load at a fixed offset.
+/// Occupancy, one byte per cell, with a border that repeats the cells across the edge, so that
+/// sensing is a load at a fixed offset.
 #[derive(Clone, Debug)]
 struct Board {
     grid: Grid,
@@ -272,7 +292,7 @@ impl Board {
     }
 }
 
-/// Places of a coordinate on the board along one axis: its own and up to two in the border.
+/// Indices of a coordinate on the board along one axis: its own and up to two in the border.
 fn places(at: u16, side: u16) -> impl Iterator<Item = usize> {
     let (at, side) = (usize::from(at), usize::from(side));
     let own = at + REACH;

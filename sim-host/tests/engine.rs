@@ -1,4 +1,4 @@
-//! The fast engine gives what the plain one gives, on every path that this processor has.
+//! The fast engine returns the results of the plain one, on every path that this processor can run.
 
 use minimal_surprise_controller::{Controller, Genome, MutationRate, Topology};
 use minimal_surprise_sim::seed::Stream;
@@ -8,7 +8,7 @@ use minimal_surprise_sim::{
 };
 use rand_core::Rng as _;
 
-/// A genome to try: random, mutated, with large weights or with hardly any.
+/// A genome to test: random, mutated, with large weights or with very small weights.
 fn genome(topology: Topology, rng: &mut Stream) -> Genome {
     let mut genome = Genome::random(topology, rng);
     let shift = match rng.next_u32() % 4 {
@@ -66,7 +66,7 @@ impl Case {
             );
             for skips in [true, false] {
                 let mut fast = Evaluator::new(Engine::Fast, path).with_repeats_skipped(skips);
-                // Twice, as the second evaluation finds what the first has left.
+                // Twice, because the second evaluation reuses the state that the first has left.
                 for _ in 0..2 {
                     assert_eq!(
                         fast.evaluate(&genome, &trials),

@@ -1,8 +1,8 @@
-//! Every reader of foreign bytes, with the corpus in `fuzz-corpus` and with mutants of it.
+//! Tests every reader of external bytes with the corpus in `fuzz-corpus` and with mutants of it.
 //!
-//! The corpus is a folder a target: seeds, and as `found-…` every input that a reader once failed
-//! on. `UPDATE_CORPUS=1` writes the seeds anew. `scripts/fuzz.sh` has the same targets guided by
-//! coverage.
+//! The corpus has one folder per target, with seeds and, as `found-…`, every input on which a
+//! reader once failed. `UPDATE_CORPUS=1` writes the seeds anew. `scripts/fuzz.sh` runs the same
+//! targets guided by coverage.
 
 mod mutation;
 mod seeds;
@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use targets::{TARGETS, Target, check, tests_folder};
 
-/// How long a target is tried with mutants: as many as there is time for. It decides nothing.
+/// How long a target is tested with mutants: as many as there is time for. No result depends on it.
 const TIME: Duration = Duration::from_secs(5);
 /// Mutants of a series are the same everywhere.
 const SERIES: u64 = 1;
@@ -24,7 +24,7 @@ fn corpus(name: &str) -> PathBuf {
     tests_folder().join("fuzz-corpus").join(name)
 }
 
-/// The inputs of a target's corpus, by their names.
+/// The inputs of a target's corpus, ordered by name.
 fn inputs(name: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let files = fs::read_dir(corpus(name)).unwrap_or_else(|_| panic!("{name} has no corpus"));
     let mut paths: Vec<PathBuf> = files.map(|file| file.unwrap().path()).collect();
@@ -33,7 +33,7 @@ fn inputs(name: &str) -> Vec<(PathBuf, Vec<u8>)> {
     paths.into_iter().map(read).collect()
 }
 
-/// Runs a target; a failure leaves its input behind, to be committed with the correction.
+/// Runs a target. A failure saves its input, to be committed with the fix.
 fn run(target: Target, bytes: &[u8], origin: &str) -> bool {
     catch_unwind(|| check(target, bytes)).unwrap_or_else(|_| {
         let name = format!("found-{:08x}", CRC_32C.checksum(bytes));

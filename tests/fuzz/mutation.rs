@@ -1,12 +1,12 @@
-//! Changes bytes at random, the way files and lines go wrong and hostile ones are made.
+//! Changes bytes at random, like damaged and hostile files and messages.
 
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// Most bytes of an input.
+/// Maximum size of an input, in bytes.
 const BYTES_MAX: usize = 1 << 16;
 
-/// What readers stumble over.
+/// Tokens that often make readers fail.
 const TOKENS: [&[u8]; 24] = [
     b"0",
     b"-1",
@@ -59,7 +59,7 @@ pub(crate) fn mutant(seeds: &[Vec<u8>], series: u64, number: u64) -> Vec<u8> {
             3 => bytes.truncate(at),
             4 => insert(&mut bytes, at..at, TOKENS[below(TOKENS.len())]),
             5 => {
-                // In place of a word or a number.
+                // Replaces a word or a number.
                 let is_word = |b: &&u8| b.is_ascii_alphanumeric() || b"+-._".contains(b);
                 let length = bytes[at..].iter().take_while(is_word).count();
                 insert(&mut bytes, at..at + length, TOKENS[below(TOKENS.len())]);

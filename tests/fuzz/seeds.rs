@@ -1,4 +1,4 @@
-//! The seeds of the corpus: small files as this program and the authors' write them.
+//! The seeds of the corpus: small files as written by this program and the authors' program.
 
 use super::targets::{CHECKPOINT_SETTINGS, SESSION, tests_folder};
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX, Provenance};
@@ -133,7 +133,7 @@ fn experiment() -> Experiment {
     Experiment::new(Settings::resolve(&given, || 0).unwrap())
 }
 
-/// The text up to the second generation, which a blank line or a header begins.
+/// The text up to the second generation, which begins with a blank line or a header.
 fn first_generation(text: &str) -> String {
     let end = text.find("\n\n").map_or(text.len(), |end| end + 2);
     text[..end].to_owned()

@@ -1,8 +1,8 @@
-//! Every reader of bytes that this project did not write itself, as a function of any bytes.
+//! Every reader of external bytes, as a function of arbitrary bytes.
 //!
-//! A target panics if what must hold does not: whatever the bytes, the reader accepts or refuses
-//! them; what it accepts is within its ranges and is read back as it was written. Where a checksum
-//! would refuse nearly all bytes, the target also tries them with the checksum that they need.
+//! A target panics if a property does not hold: the reader accepts or refuses any bytes; what it
+//! accepts is within its ranges and, written again, is read back unchanged. If a checksum would
+//! refuse nearly all bytes, the target also tries them with a correct checksum.
 
 use firmware_example::range_bearing::RangeBearing;
 use minimal_surprise_controller::codec::{self, CRC_32C, CRC_BYTES, PREFIX_BYTES};
@@ -27,10 +27,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// A reader: its name, and the function that says whether it accepted the bytes.
+/// A reader: its name, and the function that returns whether it accepted the bytes.
 pub(crate) type Target = (&'static str, fn(&[u8]) -> bool);
 
-/// All of them.
+/// All targets.
 pub(crate) const TARGETS: [Target; 20] = [
     ("genome", genome),
     ("checkpoint", checkpoint),
@@ -56,15 +56,15 @@ pub(crate) const TARGETS: [Target; 20] = [
     ("slots", slots),
 ];
 
-/// Most memory that a reader may have taken at once, whatever it reads, and beside that a byte.
+/// Maximum memory that a reader may use at once: a constant, plus an amount per byte of input.
 const MEMORY: (u64, u64) = (2 << 20, 500);
-/// Most memory that it may have asked for altogether, as a measure of its work.
+/// Maximum memory that it may allocate in total, as a measure of its work.
 const WORK: (u64, u64) = (8 << 20, 20_000);
 
-/// Runs a target and says whether it accepted the bytes.
+/// Runs a target and returns whether it accepted the bytes.
 ///
 /// # Panics
-/// If a property does not hold, or the reader takes too much memory for so few bytes.
+/// If a property does not hold, or the reader uses too much memory for the size of its input.
 pub(crate) fn check((name, target): Target, bytes: &[u8]) -> bool {
     let mut accepted = false;
     let used = allocation_counter::measure(|| accepted = target(bytes));
@@ -84,7 +84,7 @@ fn genome(bytes: &[u8]) -> bool {
     one_genome(&with_checksum(bytes)) || accepted
 }
 
-/// The bytes as a container of their own length whose checksum is right.
+/// The bytes as a container with the correct length and checksum.
 fn with_checksum(bytes: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     if let Some(body) = bytes.len().checked_sub(CRC_BYTES)
@@ -121,9 +121,9 @@ pub(crate) const CHECKPOINT_SETTINGS: &str = "grid = \"5x5\"\nrobots = 4\nsensor
 thread_local! {
     static SETTINGS: Settings =
         read_settings(CHECKPOINT_SETTINGS.as_bytes()).expect("they are settings");
-    /// A complete run, one of whose files is replaced.
+    /// A complete run, one file of which is replaced.
     static RUN: TempDir = copy_of_run();
-    /// Where a file is that is read by its path.
+    /// The path of the file for readers that take a path.
     static FOLDER: TempDir = tempfile::tempdir().unwrap();
 }
 
@@ -148,9 +148,9 @@ fn checkpoint(bytes: &[u8]) -> bool {
     accepted
 }
 
-/// Where the files are that targets start from.
+/// The folder of the files that targets start from.
 pub(crate) fn tests_folder() -> PathBuf {
-    // The same from this package and from that of coverage-guided fuzzing.
+    // The same folder from this package and from the package for coverage-guided fuzzing.
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     package.parent().unwrap().join("tests")
 }
@@ -174,7 +174,7 @@ fn run_file(name: &str, bytes: &[u8]) -> bool {
             assert!(error.to_string().contains("/"), "no path in {error}");
         }
         if let Ok(finished) = &read {
-            // It is run again, for as many steps as it has, so only where that may show something.
+            // Loading it reruns all its steps, so it is loaded only if that may find something.
             if ["best.genome", "final.json"].contains(&name) {
                 let _ = FinishedRun::read_and_check(run.path());
             }
@@ -293,7 +293,7 @@ fn drawing(bytes: &[u8]) -> bool {
     true
 }
 
-/// Messages one after the other: a byte that holds the length of each, then its bytes.
+/// Messages one after the other: one byte with the length of each, then its bytes.
 fn messages(mut bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     core::iter::from_fn(move || {
         let (&length, rest) = bytes.split_first()?;
@@ -312,7 +312,7 @@ fn framed(message: &[u8]) -> Vec<u8> {
     wire
 }
 
-/// What a robot answers to some bytes.
+/// The answers of a robot to some bytes.
 fn answers(server: &mut Server, robot: &mut LinkRobot, bytes: &[u8]) -> Vec<Vec<u8>> {
     let answer = |&byte: &u8| server.feed(byte, robot).map(<[u8]>::to_vec);
     bytes.iter().filter_map(answer).collect()
@@ -404,7 +404,7 @@ fn slots(bytes: &[u8]) -> bool {
     flash_image(&bytes) || accepted
 }
 
-/// Makes what a slot's header says of its container true.
+/// Makes a slot's header consistent with its container.
 fn make_consistent(slot: &mut [u8]) -> Option<()> {
     let front = slot.first_chunk::<BLOCK_BYTES>()?;
     let write_count = u32::from_le_bytes(*front[4..].first_chunk()?);
@@ -426,7 +426,7 @@ fn flash_image(bytes: &[u8]) -> bool {
     let slot_bytes = Slots::<Flash>::SLOT_BYTES as u32;
     for (slot, bytes) in (0..2).zip(bytes.chunks(SLOT_BYTES_MIN)) {
         for (at, byte) in (Flash::OFFSET + slot * slot_bytes..).zip(bytes) {
-            // It was erased.
+            // The slot was erased.
             flash.damage(at, byte ^ 0xff);
         }
     }

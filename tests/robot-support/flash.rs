@@ -1,4 +1,4 @@
-//! A flash chip in memory that loses its power when told to, and forgives nothing.
+//! A flash chip in memory that loses power on request and panics on misuse.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
@@ -9,27 +9,27 @@ use rand_core::{Rng, SeedableRng};
 
 /// A chip with words of `W` bytes, read and written whole, that erases `E` bytes at a time.
 ///
-/// Misuse is a panic: unaligned operations, a word written twice between two completed erases, a
-/// place outside. Of erase units larger than a slot, only the bytes that a slot needs are kept, and
-/// only those may be used.
+/// Misuse panics: unaligned operations, a word written twice between two completed erases, an
+/// address out of bounds. Of erase units larger than a slot, only the bytes that a slot needs are
+/// stored, and only those may be used.
 #[derive(Clone, Debug)]
 pub struct MockFlash<const W: usize, const E: usize> {
     bytes: Vec<u8>,
-    /// Per word, whether it may be written.
+    /// Whether each word may be written.
     erased: Vec<bool>,
     units: usize,
     cut: Option<Cut>,
-    /// What has happened so far.
+    /// Counts of operations so far.
     pub counts: Counts,
     powered: bool,
 }
 
-/// What a flash has been through.
+/// Counts of a flash's operations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Moments at which power could have failed.
     pub moments: u64,
-    /// Calls of write.
+    /// Number of writes.
     pub writes: u64,
     /// Bytes written.
     pub written_bytes: u64,
@@ -37,14 +37,14 @@ pub struct Counts {
     pub erases: u64,
 }
 
-/// A power cut to come.
+/// A future power cut.
 #[derive(Clone, Copy, Debug)]
 struct Cut {
     at_moment: u64,
     seed: u64,
 }
 
-/// Nothing works without power.
+/// The flash has no power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PowerCut;
 
@@ -54,7 +54,7 @@ impl NorFlashError for PowerCut {
     }
 }
 
-/// How an erase ends whose power fails, in the order of its moments.
+/// How an interrupted erase ends, in the order of its moments.
 const TORN_ERASES: [TornErase; 5] = [
     TornErase::Untouched,
     TornErase::HalfErased,
@@ -73,16 +73,16 @@ enum TornErase {
 }
 
 impl<const W: usize, const E: usize> MockFlash<W, E> {
-    /// Bytes kept of each erase unit.
+    /// Bytes stored of each erase unit.
     const KEPT: usize = if E < SLOT_BYTES_MIN {
         E
     } else {
         SLOT_BYTES_MIN
     };
-    /// Where the slots are: behind one erase unit of something else.
+    /// Address of the slots: after one erase unit of other data.
     pub const OFFSET: u32 = E as u32;
 
-    /// An erased chip with one erase unit before two slots.
+    /// An erased chip with one erase unit before the two slots.
     #[must_use]
     pub fn new() -> Self {
         let units = 1 + 2 * slot_bytes(E) / E;
@@ -97,7 +97,7 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         }
     }
 
-    /// The same with this in the first slot.
+    /// Like [`Self::new`], with these bytes in the first slot.
     ///
     /// # Panics
     /// If it does not fit.
@@ -110,7 +110,7 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         flash
     }
 
-    /// Power will fail after so many more moments; `seed` decides what is left behind.
+    /// Makes power fail after this many more moments; `seed` decides what is left in flash.
     pub fn cut_power_after(&mut self, moments: u64, seed: u64) {
         self.cut = Some(Cut {
             at_moment: self.counts.moments + moments,
@@ -118,19 +118,19 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         });
     }
 
-    /// Power is back, and stays.
+    /// Restores power.
     pub fn restore_power(&mut self) {
         self.powered = true;
         self.cut = None;
     }
 
-    /// Flips bits, as age does.
+    /// Flips bits, as ageing does.
     pub fn damage(&mut self, at: u32, mask: u8) {
         let place = Self::place(at, 1);
         self.bytes[place] ^= mask;
     }
 
-    /// The place of `length` bytes at an address among those that are kept.
+    /// The index of `length` bytes at an address among the stored bytes.
     fn place(at: u32, length: usize) -> usize {
         let at = at as usize;
         let (unit, within) = (at / E, at % E);
@@ -145,7 +145,7 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         unit * kept + within
     }
 
-    /// Whether power fails at this moment; the generator says how.
+    /// Whether power fails at this moment; the generator decides how.
     fn fails_now(&mut self) -> Option<ChaCha8Rng> {
         let moment = self.counts.moments;
         self.counts.moments += 1;
@@ -180,8 +180,8 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         Ok(())
     }
 
-    /// What a word holds whose writing was interrupted at byte `whole`: bytes before it are
-    /// written, the others have some of their bits, or anything.
+    /// The contents of a word whose write was interrupted at byte `whole`: the bytes before it are
+    /// written, the others have some of their bits, or any value.
     fn tear_word(word: &mut [u8], wanted: &[u8], whole: usize, rng: &mut ChaCha8Rng) {
         let anything = rng.next_u32() & 1 == 0;
         for (index, (byte, &wanted)) in word.iter_mut().zip(wanted).enumerate() {
@@ -264,7 +264,7 @@ impl<const W: usize, const E: usize> NorFlash for MockFlash<W, E> {
             self.bytes[place..place + W].copy_from_slice(wanted);
             self.counts.written_bytes += W as u64;
         }
-        // Written, but nobody hears of it.
+        // Written, but not reported.
         self.fails_now().map_or(Ok(()), |_| Err(PowerCut))
     }
 }

@@ -1,4 +1,4 @@
-//! What the tests of slots, link and programs share: a flash chip and a robot in memory.
+//! Code shared by the tests of slots, link and programs: a flash chip and a robot in memory.
 
 pub mod flash;
 pub mod full;

@@ -14,28 +14,28 @@ pub type Flash = MockFlash<4, 4096>;
 /// The robot.
 #[derive(Debug)]
 pub struct LinkRobot {
-    /// Where its genomes are.
+    /// The slots with its genomes.
     pub slots: Slots<Flash>,
     room: Buffer,
     controller: Controller,
     state: State,
     report: Report,
-    /// What it says that it computes with.
+    /// The kernel that it reports.
     pub kernel: KernelId,
-    /// The step, counted from 0 since the last reset, in which its controller errs.
+    /// The step, counted from 0 since the last reset, in which its controller makes an error.
     pub errs_in_step: Option<u32>,
-    /// The genome that it says is in use, if that is a lie.
+    /// The genome that it reports as in use, if that is wrong on purpose.
     pub claims_genome: Option<GenomeInUse>,
-    /// What it reports, if that is a lie; its surprise is that of its steps, too.
+    /// The report that it returns, if that is wrong on purpose; its steps return the same surprise.
     pub claims_report: Option<Report>,
-    /// The request, by its number among those done, that it refuses, and why.
+    /// The request that it refuses, by its number among those carried out, and the refusal.
     pub refuses: Option<(u64, Refusal)>,
-    /// Requests carried out, identification and telemetry not counted.
+    /// Number of requests carried out, without identification and telemetry.
     pub done: u64,
 }
 
 impl LinkRobot {
-    /// Switches it on.
+    /// Starts the robot.
     ///
     /// # Panics
     /// If the flash has no room for slots.
@@ -60,13 +60,13 @@ impl LinkRobot {
         }
     }
 
-    /// Its flash, after it was switched off.
+    /// Stops the robot and returns its flash.
     #[must_use]
     pub fn stop(self) -> Flash {
         self.slots.release()
     }
 
-    /// One period of its control loop, if that runs.
+    /// Runs one period of its control loop, if the loop is running.
     pub fn period(&mut self, sensors: SensorBits) {
         if self.report.running {
             let decision = self.controller.step(&mut self.state, sensors);

@@ -10,7 +10,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// How long anything may take.
+/// Maximum duration of any operation.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A browser with one page, without a network.
@@ -21,15 +21,15 @@ pub struct Browser {
     messages: Receiver<Value>,
     last_id: u64,
     session: Option<String>,
-    /// What the page said by itself, since the browser was started.
+    /// Events sent by the page since the browser was started.
     events: Vec<Value>,
     _profile: TempDir,
 }
 
-/// Where Chromium is.
+/// Finds Chromium.
 ///
 /// # Errors
-/// [`Missing`] if it is not there.
+/// [`Missing`] if it is not installed.
 pub fn chromium() -> Result<PathBuf, Missing> {
     let folders = std::env::var_os("PATH").unwrap_or_default();
     let names = ["chromium", "chromium-browser", "google-chrome"];
@@ -40,14 +40,14 @@ pub fn chromium() -> Result<PathBuf, Missing> {
 }
 
 impl Browser {
-    /// Starts it.
+    /// Starts the browser.
     ///
     /// # Panics
     /// If it does not start.
     #[must_use]
     pub fn start(chromium: &Path) -> Self {
         let profile = TempDir::new().expect("a temporary folder");
-        // It talks on descriptors 3 and 4.
+        // The browser communicates on descriptors 3 and 4.
         let mut child = Command::new("sh")
             .args([
                 "-c",
@@ -64,7 +64,7 @@ impl Browser {
                 "--disable-component-update",
                 "--no-first-run",
                 "--window-size=1280,900",
-                // No network, should a page ask for it.
+                // No network, even if a page requests it.
                 "--proxy-server=http://127.0.0.1:9",
                 "--host-resolver-rules=MAP * ~NOTFOUND",
                 "--remote-debugging-pipe",
@@ -117,7 +117,7 @@ impl Browser {
     /// Sends a command and waits for its result.
     ///
     /// # Panics
-    /// If there is none, or it is an error.
+    /// If there is no result, or it is an error.
     pub fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.last_id += 1;
         let id = self.last_id;
@@ -160,10 +160,10 @@ impl Browser {
         self.wait_for(&loaded);
     }
 
-    /// The value of an expression on the page; if it is a promise, what becomes of it.
+    /// The value of an expression on the page; if it is a promise, the value it resolves to.
     ///
     /// # Panics
-    /// If it throws, or is of another kind.
+    /// If it throws, or has another type.
     pub fn evaluate<T: serde::de::DeserializeOwned>(&mut self, expression: &str) -> T {
         let mut result = self.call(
             "Runtime.evaluate",
@@ -189,7 +189,7 @@ impl Browser {
         }
     }
 
-    /// Presses a key and lets it go: a character, or a name as in `ArrowLeft`.
+    /// Presses and releases a key: a character, or a name such as `ArrowLeft`.
     pub fn press(&mut self, key: &str) {
         self.press_with(key, 0);
     }
@@ -238,20 +238,20 @@ impl Browser {
         }
     }
 
-    /// Gives the window another size.
+    /// Resizes the window.
     pub fn resize(&mut self, width: u32, height: u32) {
         let size =
             json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
         self.call("Emulation.setDeviceMetricsOverride", size);
     }
 
-    /// Checks that no page has complained so far, and that none asked for anything that is not a
-    /// file or in the page.
+    /// Checks that no page has reported errors so far, and that none requested anything except
+    /// files and data in the page.
     ///
     /// # Panics
-    /// If one has.
+    /// If a page has.
     pub fn assert_quiet(&mut self) {
-        // Whatever was said before is here after this.
+        // All earlier events have arrived after this.
         let _: bool = self.evaluate("true");
         for event in &self.events {
             let details = &event["params"];
@@ -284,8 +284,8 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // Asked to close, it waits for its other processes, so that none writes to the profile
-        // any more when that is removed.
+        // When asked to close, it waits for its other processes, so that none still writes to the
+        // profile when that is removed.
         let _ = self
             .requests
             .write_all(b"{\"id\":0,\"method\":\"Browser.close\"}\0");

@@ -1,22 +1,22 @@
-//! File systems of a test's own.
+//! Temporary file systems for tests.
 
 use crate::tools::Missing;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A file system, or a file, mounted somewhere; gone with this.
+/// A mounted file system or file; unmounted on drop.
 #[derive(Debug)]
 pub struct Disk(PathBuf);
 
 impl Disk {
-    /// An empty file system as large as it is made.
+    /// Mounts an empty file system of the given size.
     ///
     /// # Errors
     /// [`Missing`] if this process is not privileged.
     ///
     /// # Panics
-    /// If there can be no folder of that name.
+    /// If the folder cannot be created.
     pub fn mounted_at(path: PathBuf, size: &str) -> Result<Self, Missing> {
         fs::create_dir_all(&path).expect("a folder");
         let size = format!("size={size}");
@@ -24,7 +24,7 @@ impl Disk {
         Self::mounted(path, &options)
     }
 
-    /// A file in the place of another one.
+    /// Mounts a file over another one.
     ///
     /// # Errors
     /// [`Missing`] if this process is not privileged.
@@ -44,10 +44,10 @@ impl Disk {
         }
     }
 
-    /// Mounts it with another option.
+    /// Remounts it with another option.
     ///
     /// # Panics
-    /// If that is refused.
+    /// If that fails.
     pub fn remount(&self, option: &str) {
         let mounted = Command::new("mount")
             .args(["-o", &format!("remount,{option}")])

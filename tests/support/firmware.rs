@@ -9,30 +9,30 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use std::{fs, thread};
 
-/// What `scripts/thumb-cargo.sh` exits with if it finds no compiler.
+/// Exit code of `scripts/thumb-cargo.sh` if it finds no compiler.
 const NO_COMPILER: i32 = 69;
 
-/// Longest that a program may take. A program that has crashed may never end.
+/// Maximum duration of a program. A program that has crashed may never end.
 const TIMEOUT: Duration = Duration::from_secs(300);
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// The machine that `firmware-example/memory.x` describes, with a clock that advances by a fixed
-/// time an instruction.
+/// time per instruction.
 pub(crate) const QEMU: &str = "qemu-system-arm";
 const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 \
     -icount shift=10,align=off,sleep=off \
     -nographic -monitor none -serial none \
     -semihosting-config enable=on,target=native -kernel";
 
-/// QEMU's STM32F405: neither clock nor timers, and no pins; what is written to these is traced.
+/// QEMU's STM32F405: it has neither clock, timers nor pins, but traces writes to their registers.
 const QEMU_STM32F4_ARGUMENTS: &str = "-machine netduinoplus2 \
     -nographic -monitor none -serial none -d unimp,int -D";
 
 /// The built programs of `firmware-example`.
 pub struct Firmware {
     programs: PathBuf,
-    /// The compiler they were built with.
+    /// The compiler used.
     pub compiler: String,
 }
 
@@ -63,12 +63,12 @@ pub fn build() -> Result<Firmware, Missing> {
     })
 }
 
-/// What became of a program that was to be linked.
+/// The result of linking a program.
 #[derive(Debug)]
 pub struct Linked {
-    /// Whether it was.
+    /// Whether it was linked.
     pub success: bool,
-    /// What compiler and linker said.
+    /// The output of compiler and linker.
     pub messages: String,
 }
 
@@ -86,7 +86,7 @@ pub fn link(package: &str, program: &str) -> Result<Linked, Missing> {
 /// If the program was not linked.
 #[must_use]
 pub fn flash_bytes(program: &str) -> u32 {
-    /// Kind of a section with contents, and the flag of one that is in memory.
+    /// Type of a section with contents, and flag of a section in memory.
     const PROGBITS: u32 = 1;
     const ALLOC: u32 = 2;
     let elf = fs::read(programs().join(program)).expect("a linked program");
@@ -180,16 +180,16 @@ impl Firmware {
     }
 }
 
-/// What the wheels' registers of `mps2` and of the STM32F405 are called in QEMU's traces.
+/// The names of the wheels' registers of `mps2` and of the STM32F405 in QEMU's traces.
 const MPS2_WHEELS: &str = "mps2_fpgaio_write";
 const STM32F4_WHEELS: &str = "GPIOC: unimplemented device write";
 
-/// What a program did to its wheels before and in a fault, as QEMU has seen it.
+/// What a program did to its wheels before and during a fault, as traced by QEMU.
 #[derive(Debug)]
 pub struct Faulted {
-    /// What was written to the wheels' registers, a line each.
+    /// Writes to the wheels' registers, one line each.
     pub wheels: Vec<String>,
-    /// The program's log, or, of the STM32F405, the exceptions that QEMU has seen.
+    /// The program's log or, for the STM32F405, the exceptions traced by QEMU.
     pub log: String,
 }
 
@@ -199,7 +199,7 @@ pub struct Faulted {
 /// [`Missing`] if there is no QEMU.
 ///
 /// # Panics
-/// If it does not fail by itself.
+/// If the program does not fail.
 pub fn fault_on_mps2(elf: &Path, fault: &str, trace: &Path) -> Result<Faulted, Missing> {
     let mut log = Vec::new();
     let arguments = QEMU_ARGUMENTS.replace(
@@ -251,20 +251,20 @@ pub fn fault_on_stm32f4(elf: &Path, fault: &str, trace: &Path) -> Result<Faulted
     })
 }
 
-/// The lines of a file that start like this; none if it is not there yet.
+/// The lines of a file with this start; none if the file does not exist yet.
 fn lines(path: &Path, start: &str) -> Vec<String> {
     let text = fs::read_to_string(path).unwrap_or_default();
-    // The last line may be half there.
+    // The last line may be incomplete.
     let text = text.rsplit_once('\n').map_or("", |(whole, _)| whole);
     let lines = text.lines().filter(|line| line.starts_with(start));
     lines.map(str::to_owned).collect()
 }
 
-/// Runs the program in an ELF file under QEMU, handing over each line it logs. Returns how it
-/// ended.
+/// Runs the program in an ELF file under QEMU and passes each line of its log to `line`. Returns
+/// its exit status.
 ///
 /// # Errors
-/// [`Missing`] if there is no QEMU; inside, whatever went wrong with the file, its log or QEMU.
+/// [`Missing`] if there is no QEMU; the inner error is one of the file, its log or QEMU.
 pub fn run(elf: &Path, line: impl FnMut(String)) -> Result<io::Result<ExitStatus>, Missing> {
     run_with(QEMU_ARGUMENTS, elf, line)
 }
@@ -284,7 +284,7 @@ fn run_with(
         Ok(mut child) => {
             let result = follow(elf, &mut child, line);
             if result.is_err() {
-                // It may have ended by itself; nothing is left to do about it then.
+                // It may already have ended; then there is nothing to do.
                 let _ = child.kill();
                 let _ = child.wait();
             }

@@ -22,7 +22,7 @@ pub fn random(seed: u64, topology: Topology) -> Vec<u8> {
 /// The same container, but as if it had evolved under another arithmetic.
 ///
 /// # Panics
-/// If it is none.
+/// If the bytes are not a container.
 #[must_use]
 pub fn of_another_kernel(container: &[u8]) -> Vec<u8> {
     let mut other = container.to_vec();

@@ -27,7 +27,7 @@ struct Header {
     prediction_output: Vec<i16>,
 }
 
-/// One recorded step, as it stands in the file.
+/// One recorded step, as in the file.
 #[derive(Deserialize)]
 struct StepLine {
     t: u32,

@@ -1,4 +1,4 @@
-//! A noisy run of the first version, whose hash of the steps covers bits that no sensor takes.
+//! A noisy run of the first version, whose hash of the steps covers bits without a sensor.
 
 use std::fs;
 use std::path::Path;

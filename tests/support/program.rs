@@ -1,4 +1,4 @@
-//! Running the program `evolver` as a user would, in a folder of its own.
+//! Runs the program `evolver` as a user would, in a separate folder.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -19,7 +19,7 @@ pub enum Profile {
     Release,
 }
 
-/// Builds the program, once a process, and says where it is.
+/// Builds the program, once per process, and returns its path.
 ///
 /// # Panics
 /// If it does not build.
@@ -27,7 +27,7 @@ pub enum Profile {
 pub fn path(profile: Profile) -> PathBuf {
     static DEBUG: OnceLock<PathBuf> = OnceLock::new();
     static RELEASE: OnceLock<PathBuf> = OnceLock::new();
-    /// One build at a time, or they wait for each other anyway.
+    /// One build at a time, because builds would wait for each other anyway.
     static BUILDING: Mutex<()> = Mutex::new(());
     let built = match profile {
         Profile::Debug => &DEBUG,
@@ -49,7 +49,7 @@ pub fn path(profile: Profile) -> PathBuf {
     built.get_or_init(build).clone()
 }
 
-/// The program, in an empty folder that goes when this goes.
+/// The program, in an empty folder that is removed on drop.
 #[derive(Debug)]
 pub struct Evolver {
     folder: TempDir,
@@ -61,14 +61,14 @@ pub struct Evolver {
 pub struct Finished {
     /// Its exit code; none after a signal.
     pub code: Option<i32>,
-    /// What it printed.
+    /// Its standard output.
     pub stdout: String,
-    /// What it said about itself.
+    /// Its standard error.
     pub stderr: String,
 }
 
 impl Finished {
-    /// Checks that something broke, and that the message has all these words.
+    /// Checks that the program failed, and that the message contains all these words.
     ///
     /// # Panics
     /// If it ended otherwise.
@@ -97,7 +97,7 @@ impl Evolver {
     /// The program built this way, in an empty folder.
     ///
     /// # Panics
-    /// If there is no temporary folder to be had.
+    /// If no temporary folder can be created.
     #[must_use]
     pub fn built(profile: Profile) -> Self {
         Self {
@@ -143,7 +143,7 @@ impl Evolver {
         finish(&mut command)
     }
 
-    /// Runs it to its end.
+    /// Runs the program to its end.
     ///
     /// # Panics
     /// If it cannot be started.
@@ -151,13 +151,13 @@ impl Evolver {
         finish(&mut self.command(arguments))
     }
 
-    /// Starts it.
+    /// Starts the program.
     ///
     /// # Panics
     /// If it cannot be started.
     #[must_use]
     pub fn start(&self, arguments: &[impl AsRef<OsStr>]) -> Running {
-        // It ends by signals, also where the tests themselves ignore them, as in the background.
+        // Signals end the program, even if the tests themselves ignore them, as background jobs do.
         let mut command = Command::new("env");
         if cfg!(target_os = "linux") {
             command.arg("--default-signal=INT,TERM,HUP");
@@ -177,7 +177,7 @@ impl Evolver {
         Running { child, lines }
     }
 
-    /// Starts a line of the shell in the folder.
+    /// Runs a shell command in the folder.
     ///
     /// # Panics
     /// If there is no shell.
@@ -247,7 +247,7 @@ fn finish(command: &mut Command) -> Finished {
 }
 
 impl Running {
-    /// Waits until it has written so many lines to standard error, or has ended.
+    /// Waits until it has written `count` lines to standard error, or has ended.
     pub fn wait_for_lines(&self, count: usize) {
         for _ in 0..count {
             if self.lines.recv_timeout(Duration::from_secs(120)).is_err() {
@@ -256,7 +256,7 @@ impl Running {
         }
     }
 
-    /// Kills it at once, if it has not ended; says whether it had ended well before.
+    /// Kills it at once if it has not ended; returns whether it had already ended successfully.
     ///
     /// # Panics
     /// If the operating system loses track of it.
@@ -282,7 +282,7 @@ impl Running {
     /// # Panics
     /// If it has ended.
     pub fn signal(&self, signal: &str) {
-        // The shell's own: the program is not part of a bare system.
+        // Uses the shell's builtin: a minimal system lacks the program `kill`.
         let command = format!("kill -{signal} {}", self.child.id());
         let sent = Command::new("sh").args(["-c", &command]).status();
         assert!(sent.is_ok_and(|status| status.success()), "{command}");

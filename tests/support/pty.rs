@@ -1,4 +1,4 @@
-//! Devices behind a serial port that is none: a pseudo-terminal, with a thread at its other end.
+//! Devices behind a simulated serial port: a pseudo-terminal with a thread at its other end.
 
 use crate::link_robot::{Flash, LinkRobot};
 use minimal_surprise_link::Server;
@@ -17,25 +17,25 @@ use std::time::{Duration, Instant};
 pub struct Device {
     /// The name of its port.
     pub port: String,
-    /// The port, held open: without anyone there, the other end would read errors.
+    /// The port, held open: otherwise the other end would read errors.
     held: Option<File>,
     unplugged: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// What comes of bytes that have arrived.
+/// The answer to bytes that have arrived.
 pub enum Answer {
     /// These bytes.
     Bytes(Vec<u8>),
-    /// The line is pulled.
+    /// The line is unplugged.
     Unplugged,
 }
 
 impl Device {
-    /// Plugs a device in that answers whatever arrives.
+    /// Plugs in a device that answers what arrives.
     ///
     /// # Panics
-    /// If there are no pseudo-terminals to be had.
+    /// If no pseudo-terminal can be created.
     #[must_use]
     pub fn plug_in(mut answer: impl FnMut(&[u8]) -> Answer + Send + 'static) -> Self {
         Self::with_thread(move |mut master, unplugged| {
@@ -57,11 +57,11 @@ impl Device {
         })
     }
 
-    /// Plugs a device in behind a board that restarts: from the first byte that arrives on, for so
-    /// long, it hears nothing, and says this again and again.
+    /// Plugs in a device behind a board that restarts: after the first byte arrives, it receives
+    /// nothing for `silence` and sends `noise` repeatedly.
     ///
     /// # Panics
-    /// If there are no pseudo-terminals to be had.
+    /// If no pseudo-terminal can be created.
     #[must_use]
     pub fn restarting(
         silence: Duration,
@@ -78,15 +78,15 @@ impl Device {
         })
     }
 
-    /// Plugs a device in that says the same again and again, whether anyone listens or not.
+    /// Plugs in a device that sends the same bytes repeatedly, whether or not anyone listens.
     ///
     /// # Panics
-    /// If there are no pseudo-terminals to be had.
+    /// If no pseudo-terminal can be created.
     #[must_use]
     pub fn talking(bytes: &'static [u8]) -> Self {
         Self::with_thread(move |mut master, unplugged| {
             while !unplugged.load(Ordering::Relaxed) {
-                // What nobody takes is lost.
+                // Bytes that nobody reads are lost.
                 let _ = master.write(bytes);
                 thread::sleep(Duration::from_millis(5));
             }
@@ -94,8 +94,8 @@ impl Device {
     }
 
     fn with_thread(run: impl FnOnce(PtyMaster, &AtomicBool) + Send + 'static) -> Self {
-        // What other tests start must not hold the line's ends, and nobody waits for a thread that
-        // waits for bytes.
+        // Processes started by other tests must not inherit the ends of the line, and a thread
+        // waiting for bytes must not be waited for.
         let flags = OFlag::O_RDWR | OFlag::O_NOCTTY | OFlag::O_CLOEXEC | OFlag::O_NONBLOCK;
         let master = posix_openpt(flags).expect("a pseudo-terminal");
         let port = name(&master);
@@ -129,7 +129,7 @@ impl Drop for Device {
         self.unplugged.store(true, Ordering::Relaxed);
         self.held = None;
         if let Some(thread) = self.thread.take() {
-            // Whatever it panicked about has been printed.
+            // Its panic message has been printed.
             let _ = thread.join();
         }
     }
@@ -143,28 +143,28 @@ pub struct PluggedRobot {
     pub device: Device,
 }
 
-/// What is wrong with a line.
+/// A fault of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// Nothing.
+    /// No fault.
     None,
-    /// It is pulled when the robot has done so much.
+    /// It is unplugged when the robot has carried out this many requests.
     PulledAfter(u64),
-    /// The robot's answers are lost from then on.
+    /// From then on, the robot's answers are lost.
     MuteAfter(u64),
-    /// Each answer takes 0.3 s from then on.
+    /// From then on, each answer takes 0.3 s.
     SlowAfter(u64),
 }
 
 impl PluggedRobot {
-    /// Switches a robot on and plugs it in.
+    /// Starts a robot and plugs it in.
     #[must_use]
     pub fn start(flash: Flash, fault: Fault) -> Self {
         Self::restarting(flash, fault, Duration::ZERO, b"")
     }
 
-    /// The same with a board that restarts when it is first talked to: it takes so long, says this
-    /// and hears nothing.
+    /// Like [`Self::start`], with a board that restarts at the first byte: for `silence` it sends
+    /// `noise` and receives nothing.
     #[must_use]
     pub fn restarting(flash: Flash, fault: Fault, silence: Duration, noise: &'static [u8]) -> Self {
         let robot = Arc::new(Mutex::new(LinkRobot::start(flash)));
@@ -194,7 +194,7 @@ impl PluggedRobot {
         lock(&self.robot)
     }
 
-    /// Its flash, after it was unplugged and switched off.
+    /// Unplugs the robot, switches it off and returns its flash.
     ///
     /// # Panics
     /// If the robot has panicked.

@@ -11,29 +11,29 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// As in `firmware-example/src/bin/robot.rs`. Time goes by as on the wall.
+/// As in `firmware-example/src/bin/robot.rs`. Time is wall-clock time.
 const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 -nographic -monitor none \
     -serial pty -semihosting-config enable=on,target=native -kernel";
 
-/// A robot that is switched on. Dropping it kills it.
+/// A running robot. Dropping it kills it.
 #[derive(Debug)]
 pub struct QemuRobot {
     child: Child,
     /// Its serial port.
     pub port: String,
-    /// The port, open: QEMU looks only once a second whether one that was closed is open again.
+    /// The port, held open: QEMU checks only once per second whether a closed port is open again.
     _open: File,
 }
 
 impl QemuRobot {
-    /// Switches it on. Its flash is `flash.bin` in `folder`, made if it is not there; what it logs
-    /// is dropped.
+    /// Starts the robot. Its flash is `flash.bin` in `folder`, created if missing; its log is
+    /// dropped.
     ///
     /// # Errors
     /// [`Missing`] if there is no QEMU.
     ///
     /// # Panics
-    /// If QEMU does not say which port it is.
+    /// If QEMU does not print the name of the port.
     pub fn start(firmware: &Firmware, folder: &Path) -> Result<Self, Missing> {
         let child = Command::new(QEMU)
             .args(QEMU_ARGUMENTS.split_whitespace())
@@ -68,7 +68,7 @@ impl QemuRobot {
         })
     }
 
-    /// Pulls its plug: SIGKILL.
+    /// Cuts its power: SIGKILL.
     ///
     /// # Panics
     /// If it cannot be killed.
@@ -80,7 +80,7 @@ impl QemuRobot {
 
 impl Drop for QemuRobot {
     fn drop(&mut self) {
-        // It may have ended by itself; nothing is left to do about it then.
+        // It may already have ended; then there is nothing to do.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -92,7 +92,7 @@ pub struct Line {
     client: Client,
 }
 
-/// No answer.
+/// Why there is no answer.
 #[derive(Debug)]
 pub enum LineError {
     /// The port reports an error: the robot is off.
@@ -108,7 +108,7 @@ impl From<io::Error> for LineError {
 }
 
 impl Line {
-    /// Opens a port, and a session of this number.
+    /// Opens a port, and a session with this number.
     ///
     /// # Errors
     /// If there is no such port.
@@ -122,7 +122,7 @@ impl Line {
         })
     }
 
-    /// Asks, and hands over the answer.
+    /// Sends a request and passes the answer on.
     ///
     /// # Errors
     /// [`LineError`].

@@ -1,4 +1,4 @@
-//! Runs a firmware program under QEMU, prints what it logs, and ends as it ends.
+//! Runs a firmware program under QEMU, prints its log, and exits with its exit code.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -40,7 +40,7 @@ struct ClusterLine {
     verdict: String,
 }
 
-/// Everything that is counted in a state.
+/// All counts of a state.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Counts {
     /// Robots in lines.
@@ -65,7 +65,7 @@ pub struct Counts {
     pub clusters: u64,
     /// Connected pairs of clusters.
     pub connections: u64,
-    /// What the clusters amount to; without clusters, clustering.
+    /// The grouping that the clusters form; clustering if there are none.
     pub verdict: Structure,
 }
 

@@ -1,4 +1,4 @@
-//! A program in a terminal: a pseudo-terminal that somebody types into, and whose screen is read.
+//! A program in a pseudo-terminal that receives keys and whose screen is read.
 
 use crate::program::Evolver;
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
@@ -8,10 +8,10 @@ use std::process::Command;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Longest wait for the screen to show something.
+/// Maximum time to wait for the screen to show something.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A program that runs in a terminal. It is killed when this is dropped.
+/// A program that runs in a terminal. It is killed on drop.
 pub struct Terminal {
     child: Box<dyn Child + Send + Sync>,
     master: Box<dyn MasterPty + Send>,
@@ -42,7 +42,7 @@ fn line_settings(master: &(dyn MasterPty + Send)) -> u32 {
 }
 
 impl Terminal {
-    /// Starts the program in a terminal of so many rows and columns, which knows 256 colours and
+    /// Starts the program in a terminal with this number of rows and columns, 256 colours and
     /// UTF-8.
     ///
     /// # Panics
@@ -58,7 +58,7 @@ impl Terminal {
         Self::start_with(evolver, window, variables, arguments)
     }
 
-    /// The same; a variable without a value is not set.
+    /// Like [`Self::start`], with environment variables; a variable without a value is unset.
     ///
     /// # Panics
     /// If it cannot be started.
@@ -119,16 +119,16 @@ impl Terminal {
         }
     }
 
-    /// Types.
+    /// Types keys.
     ///
     /// # Panics
-    /// If nobody listens.
+    /// If the terminal is gone.
     pub fn types(&mut self, keys: &str) {
         self.keys.write_all(keys.as_bytes()).expect("it listens");
         self.keys.flush().expect("it listens");
     }
 
-    /// Makes the window another size.
+    /// Resizes the window.
     ///
     /// # Panics
     /// If the terminal is gone.
@@ -137,7 +137,7 @@ impl Terminal {
         self.master.resize(size(rows, columns)).expect("it is open");
     }
 
-    /// The screen as it is.
+    /// The current screen.
     #[must_use]
     pub fn screen(&self) -> &vt100::Screen {
         self.parser.screen()
@@ -154,7 +154,7 @@ impl Terminal {
     /// Waits until the screen shows these words.
     ///
     /// # Panics
-    /// If it does not in time.
+    /// If that does not happen in time.
     pub fn wait_for(&mut self, words: &str) {
         self.wait_until(words, true);
     }
@@ -162,15 +162,15 @@ impl Terminal {
     /// Waits until the screen does not show these words any more.
     ///
     /// # Panics
-    /// If it does not in time.
+    /// If that does not happen in time.
     pub fn wait_while(&mut self, words: &str) {
         self.wait_until(words, false);
     }
 
-    /// Waits until this holds of the screen, which arrives in pieces.
+    /// Waits until the condition holds for the screen, whose contents arrive in pieces.
     ///
     /// # Panics
-    /// If it does not in time.
+    /// If that does not happen in time.
     pub fn wait_until_it_shows(&mut self, what: &str, holds: impl Fn(&Self) -> bool) {
         let started = Instant::now();
         while !holds(self) {
@@ -187,7 +187,7 @@ impl Terminal {
         self.sent.extend_from_slice(bytes);
     }
 
-    /// Everything that the program has sent, codes and all.
+    /// Everything that the program has sent, including escape codes.
     #[must_use]
     pub fn sent(&self) -> String {
         String::from_utf8_lossy(&self.sent).into_owned()
@@ -211,7 +211,7 @@ impl Terminal {
     /// Types, and waits until the screen shows these words.
     ///
     /// # Panics
-    /// If it does not in time.
+    /// If that does not happen in time.
     pub fn after(&mut self, keys: &str, words: &str) {
         self.types(keys);
         self.wait_for(words);
@@ -229,7 +229,7 @@ impl Terminal {
         assert!(sent.is_ok_and(|status| status.success()), "kill {id}");
     }
 
-    /// Waits for the end of the program; gives its exit code.
+    /// Waits for the end of the program; returns its exit code.
     ///
     /// # Panics
     /// If it does not end in time.
@@ -248,14 +248,14 @@ impl Terminal {
                 }
             }
         };
-        // What it wrote last is still on its way.
+        // Its last output may still be on its way.
         while let Ok(bytes) = self.output.recv_timeout(Duration::from_millis(500)) {
             self.takes(&bytes);
         }
         status.exit_code()
     }
 
-    /// Whether the screen, the cursor and the line are as a shell needs them.
+    /// Whether the screen, the cursor and the line settings are as a shell needs them.
     #[must_use]
     pub fn is_restored(&self) -> bool {
         let screen = self.screen();
@@ -265,8 +265,8 @@ impl Terminal {
     }
 }
 
-/// Runs a line of the shell in a terminal, closes the terminal once this holds, and waits for the
-/// end of the shell.
+/// Runs a shell command in a terminal, closes the terminal once `when` holds, and waits for the end
+/// of the shell.
 ///
 /// # Panics
 /// If it does not start or end in time.
@@ -295,7 +295,7 @@ pub fn close_terminal_of(evolver: &Evolver, line: &str, when: impl Fn() -> bool)
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        // It may have ended; the end of the process cleans up after it.
+        // It may already have ended; the end of this process cleans up.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

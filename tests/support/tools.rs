@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// A tool is not there; says what to install.
+/// A tool is missing; holds what to install.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Missing(pub String);
 
@@ -12,7 +12,7 @@ impl fmt::Display for Missing {
     }
 }
 
-/// The tool, or `None` after saying that the test is skipped.
+/// Returns the tool, or prints that the test is skipped and returns `None`.
 ///
 /// # Panics
 /// If the tool is missing and the environment has `CI=true`: there, a skipped test would pass

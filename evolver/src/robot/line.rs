@@ -173,7 +173,7 @@ impl Line {
             _ if self.answered => return Problem::Unanswered { doing, reader },
             Some(MalformedMessage::WrongWay) => Heard::Echo,
             Some(MalformedMessage::OtherVersion { found }) => Heard::OtherVersion { found },
-            Some(MalformedMessage::NotAMessage) => Heard::Frames,
+            Some(_) => Heard::Frames,
             None if self.received > 0 => Heard::Bytes {
                 count: self.received,
             },

@@ -1,10 +1,10 @@
-//! Programs that are only linked, never run: what they hold is looked at.
+//! Programs that are only linked, never run, so that their contents can be inspected.
 //!
-//! A panic here calls a function that does not exist, so that a program into which a panic is
-//! linked cannot be linked at all.
+//! A panic calls a function that does not exist, so a program that contains a panic cannot be
+//! linked.
 //!
-//! With `unsafe` code: that function must be declared, and a board without a device has nothing
-//! but addresses, which the compiler must not see through.
+//! With `unsafe` code: that function must be declared, and a board without a device consists only
+//! of addresses, whose contents the compiler must not know.
 #![no_std]
 #![allow(unsafe_code)]
 
@@ -27,22 +27,22 @@ fn panic(_: &PanicInfo<'_>) -> ! {
     a_panic_can_be_reached()
 }
 
-/// A register that reads as anything.
+/// A register that may hold any value.
 const REGISTER: *mut u32 = 0x4000_0000 as *mut u32;
 
-/// Anything.
+/// Any value.
 pub fn read() -> u32 {
     // SAFETY: the address of a device; this is never run.
     unsafe { ptr::read_volatile(REGISTER) }
 }
 
-/// Makes the compiler work something out.
+/// Makes the compiler compute a value.
 pub fn write(value: u32) {
     // SAFETY: the address of a device; this is never run.
     unsafe { ptr::write_volatile(REGISTER, value) }
 }
 
-/// A board of which nothing is known.
+/// A board of which the compiler knows nothing.
 #[derive(Debug)]
 pub struct AnyBoard;
 
@@ -93,11 +93,11 @@ impl Board for AnyBoard {
     }
 }
 
-/// A flash of which nothing is known.
+/// A flash of which the compiler knows nothing.
 #[derive(Debug)]
 pub struct AnyFlash;
 
-/// It has failed.
+/// The flash has failed.
 #[derive(Debug)]
 pub struct AnyError;
 
@@ -155,7 +155,7 @@ struct Longs {
     _bytes: [u8; 64],
 }
 
-/// What any firmware has: the compiler's functions for copying, comparing and clearing memory.
+/// The compiler's functions for copying, comparing and clearing memory, which any firmware has.
 #[inline(never)]
 pub fn use_memory() {
     let mut bytes = [0_u8; 256];

@@ -1,10 +1,10 @@
-//! Prints what the controller costs: instructions, memory and stack. Each line is a key of
+//! Prints the cost of the controller: instructions, memory and stack. Each line is a key of
 //! `budget.toml` and the worst value found.
 //!
-//! Runs under QEMU with `-icount`. The values depend on the compiler, so no expected output lies
-//! beside this file; the test `budget` compares them with `budget.toml`.
+//! Runs under QEMU with `-icount`. The values depend on the compiler, so there is no file with the
+//! expected output; the test `budget` compares them with `budget.toml`.
 //!
-//! With `unsafe` code: assembler that starts the clock before anything else.
+//! With `unsafe` code: assembler that starts the clock before any other code.
 #![no_std]
 #![no_main]
 #![allow(unsafe_code)]
@@ -28,14 +28,14 @@ use minimal_surprise_slots::{Buffer, InUse, Slots};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// Sets of inputs that the activations are counted for.
+/// Sets of inputs for which the instructions of the activations are counted.
 const INPUT_SETS: u32 = 1000;
-/// Steps of each genome that are counted.
+/// Counted steps of each genome.
 const STEPS_PER_GENOME: u32 = 100;
-/// Bytes that the stack's measurement is tried on.
+/// Stack bytes used to test the measurement.
 const KNOWN_BYTES: usize = 400;
 
-// The clock runs from the reset on: SysTick's reload value, its value, then control (on, the
+// Starts the clock at reset: SysTick's reload value, its current value, then control (on, the
 // processor's clock, no interrupt).
 global_asm!(
     ".global __pre_init",
@@ -146,7 +146,7 @@ fn step(controller: &Controller, state: &mut State, sensors: SensorBits) -> Deci
     controller.step(state, sensors)
 }
 
-/// Whether it is a genome.
+/// Whether the bytes are a genome.
 #[inline(never)]
 fn decode(bytes: &[u8]) -> bool {
     EncodedGenome::decode(bytes).is_ok()
@@ -159,7 +159,7 @@ fn build(bytes: &[u8]) {
     }
 }
 
-/// What a robot does at its start.
+/// The code that a robot runs at its start.
 #[inline(never)]
 fn start(flash: &mut MemoryFlash, room: &mut Buffer) -> Controller {
     let mut slots = Slots::open(flash, 0, room).expect("there is room");
@@ -173,7 +173,7 @@ fn open(flash: &mut MemoryFlash, room: &mut Buffer) {
     black_box(&start(flash, room));
 }
 
-/// So that a wrong measurement is found out.
+/// Detects a wrong measurement.
 #[inline(never)]
 fn known_depth() {
     black_box(&mut [black_box(1_u8); KNOWN_BYTES]);

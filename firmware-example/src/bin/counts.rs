@@ -1,7 +1,7 @@
-//! Prints how many instructions the controller takes: a layer of activations, and a step.
+//! Prints how many instructions a layer of activations and a control step take.
 //!
-//! Runs under QEMU with `-icount`. The counts depend on the compiler, so no expected output lies
-//! beside this file.
+//! Runs under QEMU with `-icount`. The counts depend on the compiler, so there is no file with the
+//! expected output.
 #![no_std]
 #![no_main]
 
@@ -16,10 +16,10 @@ use minimal_surprise_controller::{Controller, Decision, SensorBits, State, Topol
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// Sets of inputs that the activations are counted for.
+/// Sets of inputs for which the instructions of the activations are counted.
 const INPUT_SETS: u32 = 1000;
 
-/// Steps of each genome that are counted.
+/// Counted steps of each genome.
 const STEPS_PER_GENOME: u32 = 100;
 
 #[entry]
@@ -62,7 +62,8 @@ fn main() -> ! {
     board::succeed()
 }
 
-/// The activations of a layer, as a function of its own so that its instructions can be counted and read.
+/// The activations of a layer, in a separate function so that its instructions can be counted and
+/// read.
 #[inline(never)]
 fn layer(values: &mut [i16; 14]) {
     for value in values {

@@ -1,5 +1,5 @@
-//! Turns the wheels, which are lights here, and provokes the fault that QEMU's command line names.
-//! The test `faults` watches the wheels from outside.
+//! Turns the wheels (lights on this board) and provokes the fault named on QEMU's command line. The
+//! test `faults` observes the wheels from outside.
 #![no_std]
 #![no_main]
 

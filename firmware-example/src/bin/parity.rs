@@ -1,6 +1,6 @@
 //! Prints the hashes of [`firmware_example::parity`] as computed here.
 //!
-//! `parity.out` beside this file is what it must print.
+//! The output must equal `parity.out` in this directory.
 #![no_std]
 #![no_main]
 

@@ -7,8 +7,8 @@
 //! ```
 //!
 //! QEMU's first line of output names the serial port. Genomes are in `flash.bin` in the directory
-//! that QEMU is started in; delete it for a robot fresh from the factory. Its log, behind that
-//! first line, is `defmt`'s.
+//! where QEMU is started; delete the file to get a robot in its factory state. After the first
+//! line, the output is the robot's `defmt` log.
 #![no_std]
 #![no_main]
 

@@ -1,12 +1,12 @@
-//! What a robot's electronics must offer.
+//! What a robot's electronics must provide.
 
 use minimal_surprise_controller::neighbours::Neighbours;
 use minimal_surprise_link::Report;
 
-/// Most neighbours that are kept in one period.
+/// Maximum number of neighbours kept in one period.
 pub const NEIGHBOURS_MAX: usize = 16;
 
-/// What the wheels do until they are told something else.
+/// What the wheels do until the next command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     /// They stand.
@@ -19,22 +19,22 @@ pub enum Motion {
     Right,
 }
 
-/// A robot's electronics, but for its flash. No function waits, except [`Board::sleep`].
+/// A robot's electronics, except its flash. No function waits, except [`Board::sleep`].
 pub trait Board {
     /// Side of a grid cell, in mm.
     const CELL_MM: f32;
 
-    /// Adds the neighbours detected since the last call; says whether the detector has delivered
-    /// anything since then. If it has, and nothing was added, there is no neighbour.
+    /// Adds the neighbours detected since the last call; returns whether the detector has delivered
+    /// data since then. If it has, and nothing was added, there is no neighbour.
     fn detect(&mut self, neighbours: &mut Neighbours<NEIGHBOURS_MAX>) -> bool;
 
     /// Sets the motors.
     fn drive(&mut self, motion: Motion);
 
-    /// The next byte from the line, if one has arrived.
+    /// Returns the next byte from the line, if one has arrived.
     fn receive(&mut self) -> Option<u8>;
 
-    /// Puts a byte on the line; says whether there was room for it.
+    /// Puts a byte on the line; returns whether there was room for it.
     fn send(&mut self, byte: u8) -> bool;
 
     /// Whether another control period has begun since the last call.
@@ -43,12 +43,12 @@ pub trait Board {
     /// Waits until a byte arrives or a control period begins; may return early.
     fn sleep(&mut self);
 
-    /// Puts off the restart by the watchdog.
+    /// Feeds the watchdog, which postpones its restart of the robot.
     fn feed_watchdog(&mut self);
 
     /// Whether the watchdog has caused the last restart.
     fn restarted_by_watchdog(&self) -> bool;
 
-    /// Logs how it is going.
+    /// Logs a status report.
     fn log(&mut self, report: &Report);
 }

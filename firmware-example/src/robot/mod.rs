@@ -1,7 +1,7 @@
 //! The firmware of a robot: the control loop, and the answers to its host.
 //!
-//! Once a control period: read neighbours, encode them as sensor bits, step, act, report. In
-//! between the robot answers its host. It stands until the host starts it.
+//! Once per control period: read neighbours, encode them as sensor bits, step, act, report. In
+//! between, the robot answers its host. It stands until the host starts it.
 //!
 //! **Safe by itself.** Whatever the genome decides, the robot
 //!
@@ -9,7 +9,7 @@
 //!   moved;
 //! - stands while its newest neighbour data is older than [`DATA_PERIODS_MAX`] periods;
 //! - stops its motors before it writes to flash, which may stall the chip;
-//! - is restarted by the watchdog, and so stands, unless it gets to the end of its loop.
+//! - is restarted by the watchdog, and then stands, unless it reaches the end of its loop.
 
 mod board;
 
@@ -34,12 +34,12 @@ const LOG_PERIODS: u32 = 100;
 /// The sensor of the cell straight ahead, in every sensor model.
 const AHEAD: u16 = 1;
 
-/// The robot cannot start. The board or the place for its slots is not what it must be.
+/// The robot cannot start, because of its board or the location of its slots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StartError {
     /// The slots do not fit the flash.
     Place(PlaceError),
-    /// [`Board::CELL_MM`] is no size.
+    /// [`Board::CELL_MM`] is not a positive number.
     Cell(InvalidCellSize),
 }
 
@@ -48,13 +48,13 @@ pub enum StartError {
 pub struct Robot<B, F> {
     server: Server,
     body: Body<B, F>,
-    /// The answer that is being sent, its length, and how much of it is on the line.
+    /// The answer being sent, its length, and the number of bytes already sent.
     outgoing: [u8; WIRE_BYTES_MAX],
     length: usize,
     sent: usize,
 }
 
-/// All but the line.
+/// Everything except the line.
 #[derive(Debug)]
 struct Body<B, F> {
     board: B,
@@ -68,13 +68,13 @@ struct Body<B, F> {
     controller: Controller,
     state: State,
     report: Report,
-    /// Faults that stay until the next restart.
+    /// Faults that persist until the next restart.
     lasting: Faults,
     periods_to_log: u32,
 }
 
 impl<B: Board, F: NorFlash> Robot<B, F> {
-    /// Switches a robot on whose genome slots are at `offset` in `flash`.
+    /// Starts a robot whose genome slots are at `offset` in `flash`.
     ///
     /// # Errors
     /// [`StartError`].
@@ -114,14 +114,14 @@ impl<B: Board, F: NorFlash> Robot<B, F> {
         })
     }
 
-    /// The loop.
+    /// Runs the loop forever.
     pub fn run(&mut self) -> ! {
         loop {
             self.go_round();
         }
     }
 
-    /// Once through the loop.
+    /// Runs the loop once.
     pub fn go_round(&mut self) {
         let idle = self.talk();
         if self.body.board.period_begun() {
@@ -137,12 +137,12 @@ impl<B: Board, F: NorFlash> Robot<B, F> {
         &mut self.body.board
     }
 
-    /// Takes a byte from the line and puts bytes on it; says whether there was nothing to do.
+    /// Takes a byte from the line and puts bytes on it; returns whether there was nothing to do.
     fn talk(&mut self) -> bool {
         let answer = self.outgoing.get(self.sent..self.length).unwrap_or(&[]);
         for &byte in answer {
             if !self.body.board.send(byte) {
-                // Nothing is taken before the answer is gone; the host waits for it.
+                // No byte is taken until the answer is sent; the host waits for it.
                 return false;
             }
             self.sent += 1;
@@ -194,9 +194,9 @@ impl<B: Board, F: NorFlash> Body<B, F> {
         };
     }
 
-    /// What the robot does about a decision: what was decided, unless it might collide. The cell
-    /// ahead counts as occupied unless this period's data says otherwise: since older data the
-    /// robot has moved.
+    /// What the robot does: what was decided, unless it might collide. The cell ahead counts as
+    /// occupied unless the data of this period says otherwise: the robot has moved since older
+    /// data.
     fn guarded(&mut self, decision: Decision) -> Motion {
         match (decision.action, decision.turn) {
             (Action::Straight, _) if self.data_periods > 0 || self.sensors.bits() & AHEAD != 0 => {
@@ -243,7 +243,7 @@ impl<B: Board, F: NorFlash> Body<B, F> {
         }
     }
 
-    /// What the host is told about an update that failed.
+    /// The refusal of a failed update; records a flash fault.
     fn refusal(&mut self, error: UpdateError<F::Error>) -> Refusal {
         let refusal = refusal(&error);
         if refusal == Refusal::Flash {
@@ -253,7 +253,7 @@ impl<B: Board, F: NorFlash> Body<B, F> {
     }
 }
 
-/// What a host is told about an update that failed.
+/// The refusal of a failed update.
 #[must_use]
 pub fn refusal<E: core::fmt::Debug>(error: &UpdateError<E>) -> Refusal {
     match *error {
@@ -271,7 +271,7 @@ pub fn refusal<E: core::fmt::Debug>(error: &UpdateError<E>) -> Refusal {
     }
 }
 
-/// What a host is told about the genome that the robot runs.
+/// The genome that the robot runs, as reported to a host.
 #[must_use]
 pub fn genome_in_use<F: NorFlash>(slots: &Slots<F>) -> GenomeInUse {
     match slots.newest() {
@@ -285,7 +285,7 @@ pub fn genome_in_use<F: NorFlash>(slots: &Slots<F>) -> GenomeInUse {
     }
 }
 
-/// One more, unless there is no larger number.
+/// Adds one to a counter, saturating.
 fn count(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
@@ -304,7 +304,7 @@ impl<B: Board, F: NorFlash> Handler for Body<B, F> {
 
     fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal> {
         self.standing()?;
-        // The chip may stall for seconds; wheels that turn would go on turning.
+        // The chip may stall for seconds, during which turning wheels would keep turning.
         self.board.drive(Motion::Stop);
         let begun = self.slots.begin(length, crc);
         begun.map_err(|error| self.refusal(error))
@@ -322,7 +322,7 @@ impl<B: Board, F: NorFlash> Handler for Body<B, F> {
         let write_count = committed.map_err(|error| self.refusal(error))?;
         self.controller = self.slots.in_use(&mut self.room).controller();
         self.state = State::new(&self.controller);
-        // Sensor bits of another model mean other cells.
+        // Sensor bits have a different meaning for another model.
         self.data_periods = DATA_PERIODS_MAX;
         self.sensors = SensorBits::NONE;
         Ok(write_count)

@@ -11,9 +11,9 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 use crate::interrupts;
 
-/// The processor's clock: half of what the chip can, so that SysTick reaches a second.
+/// The processor's clock: half of the chip's maximum, so that SysTick can count a second.
 pub(crate) const CLOCK_HZ: u32 = 84_000_000;
-/// Control periods a second.
+/// Control periods per second.
 pub(crate) const CONTROL_HZ: u32 = 1;
 /// Side of a grid cell, in mm.
 pub(crate) const CELL_MM: f32 = 100.0;
@@ -45,7 +45,7 @@ impl Stm32F4 {
         }
     }
 
-    /// Takes what the module has sent. Of several scans in a period the newest counts.
+    /// Reads the bytes from the module. If a period has several scans, the newest counts.
     fn take_scans(&mut self) {
         while let Some(byte) = interrupts::byte_from_module() {
             self.scan_is_new |= self.module.feed(byte, &mut self.scan);
@@ -71,7 +71,7 @@ impl Board for Stm32F4 {
     }
 
     fn receive(&mut self) -> Option<u8> {
-        // More often than once a period, or the module's bytes would pile up.
+        // Called more often than once per period, otherwise the module's bytes would pile up.
         self.take_scans();
         interrupts::byte_from_line()
     }

@@ -1,4 +1,4 @@
-//! Wheels that stop whatever happens.
+//! Stops the wheels in every fault.
 //!
 //! With `unsafe` code: the wheels' registers are addresses.
 #![allow(unsafe_code)]
@@ -9,17 +9,18 @@ use defmt_rtt as _;
 use firmware_example::fault_handlers;
 use firmware_example::faults::{Fault, WheelsOff};
 
-/// Port C: which of its pins are outputs of the program, and setting and clearing them.
+/// Port C: the registers that select its program-controlled outputs, and that set and clear pins.
 const GPIOC_MODER: u32 = 0x4002_0800;
 const GPIOC_BSRR: u32 = 0x4002_0818;
 
-/// PC6 to PC9, speed and direction of both wheels, are low, and outputs of the program: the timer
-/// has no pin any more. Nothing else is on port C, and its other pins are inputs, as after a reset.
-// SAFETY: only pins of the wheels.
+/// Sets PC6 to PC9, speed and direction of both wheels, low and makes them program-controlled
+/// outputs, which disconnects the timer. Nothing else is on port C; its other pins are inputs, as
+/// after a reset.
+// SAFETY: only the wheels' pins are affected.
 static WHEELS_OFF: WheelsOff<2> =
     unsafe { WheelsOff::new([[GPIOC_BSRR, 0x03c0_0000], [GPIOC_MODER, 0x0005_5000]]) };
 
-/// Stops the wheels and waits for the watchdog, which tells the host about itself.
+/// Stops the wheels and waits for the watchdog's restart, which is reported to the host.
 pub(crate) fn stand() -> ! {
     interrupt::disable();
     WHEELS_OFF.write();

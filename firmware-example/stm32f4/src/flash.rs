@@ -11,8 +11,8 @@ use stm32f4xx_hal::pac::FLASH;
 /// Offset of the slots in the chip's flash, in bytes.
 const SLOTS_AT: u32 = SLOT_0_ADDRESS - FLASH_ADDRESS;
 
-/// The slots' sectors. Offset 0 is the address of slot 0. While it erases or writes, the processor
-/// waits.
+/// The slots' sectors. Offset 0 is the address of slot 0. The processor waits while the flash
+/// erases or writes.
 pub(crate) struct SlotFlash {
     chip: FLASH,
 }
@@ -46,7 +46,7 @@ impl SlotFlash {
         Self { chip }
     }
 
-    /// The chip keeps its errors until they are cleared, and does nothing until then.
+    /// The chip keeps its error flags until they are cleared, and refuses to work until then.
     fn clear_errors(&mut self) {
         self.chip.sr().write(|w| {
             w.pgserr().clear_bit_by_one();
@@ -57,7 +57,7 @@ impl SlotFlash {
         });
     }
 
-    /// The processor's copies of data in flash do not notice that it was erased.
+    /// The processor's data cache does not notice that the flash was erased.
     fn clear_cache(&mut self) {
         let acr = self.chip.acr();
         acr.modify(|_, w| w.dcen().clear_bit());

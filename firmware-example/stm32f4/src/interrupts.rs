@@ -1,6 +1,6 @@
-//! What happens beside the loop: bytes arrive, and control periods begin.
+//! Interrupts: bytes arrive, and control periods begin, while the loop runs.
 //!
-//! With `unsafe` code: unmasking interrupts is unsafe. It touches no memory.
+//! With `unsafe` code: unmasking interrupts is unsafe. It accesses no memory.
 #![allow(unsafe_code)]
 
 use core::cell::RefCell;
@@ -18,11 +18,11 @@ use stm32f4xx_hal::serial::{Instance, Rx};
 
 use crate::wheels::Wheels;
 
-/// Bytes kept until the loop takes them: more than a frame on either line. Those that find no
-/// room are lost, as on the line.
+/// Number of bytes kept until the loop takes them: more than a frame on either line. Further bytes
+/// are lost, as on the line.
 const BYTES_MAX: usize = 256;
 
-/// What loop and interrupts both use; none before it is there.
+/// The state shared by loop and interrupts; `None` before it is initialised.
 type Shared<T> = Mutex<RefCell<Option<T>>>;
 
 /// A serial line's receiver and what it has received.
@@ -36,7 +36,7 @@ static MODULE: Shared<Receiver<USART3>> = Mutex::new(RefCell::new(None));
 static WHEELS: Shared<Wheels> = Mutex::new(RefCell::new(None));
 static PERIOD_BEGUN: AtomicBool = AtomicBool::new(false);
 
-/// Works with what is shared; no interrupt occurs meanwhile.
+/// Accesses the shared state with interrupts disabled.
 fn with<T, R>(shared: &Shared<T>, work: impl FnOnce(&mut T) -> R) -> Option<R> {
     critical_section::with(|section| {
         let mut shared = shared.borrow(section).try_borrow_mut().ok()?;
@@ -48,7 +48,7 @@ fn put<T>(shared: &Shared<T>, value: T) {
     critical_section::with(|section| shared.borrow(section).replace(Some(value)));
 }
 
-/// Takes charge of the wheels, which stand then.
+/// Takes ownership of the wheels and stops them.
 pub(crate) fn take_wheels(wheels: Wheels) {
     put(&WHEELS, wheels);
     drive(Motion::Stop);
@@ -59,13 +59,14 @@ pub(crate) fn drive(motion: Motion) {
     with(&WHEELS, |wheels| wheels.drive(motion));
 }
 
-/// Begins to receive from the host's line and the range-and-bearing module.
+/// Starts to receive from the host's line and the range-and-bearing module.
 pub(crate) fn listen(mut line: Rx<USART2>, mut module: Rx<USART3>) {
     line.listen();
     module.listen();
     put(&LINE, Receiver::new(line));
     put(&MODULE, Receiver::new(module));
-    // SAFETY: nothing relies on these interrupts being masked; they share by `with` only.
+    // SAFETY: nothing relies on these interrupts being masked; they access shared state through
+    // `with` only.
     unsafe {
         NVIC::unmask(Interrupt::USART2);
         NVIC::unmask(Interrupt::USART3);
@@ -87,7 +88,7 @@ pub(crate) fn take_period() -> bool {
     PERIOD_BEGUN.swap(false, Ordering::Relaxed)
 }
 
-/// Waits for an interrupt, unless something is already there.
+/// Waits for an interrupt, unless there is already something to do.
 pub(crate) fn sleep() {
     critical_section::with(|_| {
         let nothing = |bytes: Option<bool>| bytes.unwrap_or(true);
@@ -95,8 +96,8 @@ pub(crate) fn sleep() {
             && nothing(with(&MODULE, |module| module.bytes.is_empty()))
             && !PERIOD_BEGUN.load(Ordering::Relaxed);
         if idle {
-            // An interrupt wakes the processor here, and is taken after the critical section: so
-            // none can slip in between the look and the sleep.
+            // An interrupt wakes the processor here and is taken after the critical section, so
+            // none can occur between the check and the sleep.
             asm::wfi();
         }
     });
@@ -112,11 +113,11 @@ impl<U: Instance> Receiver<U> {
         loop {
             match self.rx.read() {
                 Ok(byte) => {
-                    // Without room the byte is lost, and the frame's CRC tells.
+                    // If there is no room, the byte is lost and the frame's CRC detects it.
                     let _ = self.bytes.push_back(byte);
                 }
                 Err(nb::Error::WouldBlock) => return,
-                // A broken byte is lost too; reading has cleared the error.
+                // A damaged byte is lost too; reading it has cleared the error.
                 Err(nb::Error::Other(_)) => {}
             }
         }
@@ -133,8 +134,8 @@ fn USART3() {
     with(&MODULE, Receiver::receive);
 }
 
-/// A control period begins. Wheels that nobody has told anything for a whole period stand: the
-/// watchdog would need seconds for that.
+/// A control period begins. Wheels that have received no command for a whole period are stopped:
+/// the watchdog would take seconds.
 #[exception]
 fn SysTick() {
     if PERIOD_BEGUN.swap(true, Ordering::Relaxed) {

@@ -1,9 +1,8 @@
 //! The robot, on an STM32F405 or STM32F407 with 1 MiB of flash.
 //!
-//! **Not run on hardware yet.** It builds, and its loop, its slots and its line are those that the
-//! tests run in an emulator; what this package adds has only been built, and read beside the HAL's
-//! sources.
-//! `docs/robot.md` says how to wire it, and what to try first.
+//! **Not run on hardware yet.** It builds, and the tests run its loop, its slots and its line in an
+//! emulator; the code added by this package has only been built and checked against the HAL's
+//! sources. `docs/robot.md` describes the wiring and the first tests.
 //!
 //! ```text
 //! cd firmware-example/stm32f4
@@ -30,11 +29,11 @@ use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 use wheels::{PWM_HZ, Wheel, Wheels};
 
-/// Bits a second of both serial lines; 8 data bits, no parity, 1 stop bit.
+/// Bits per second of both serial lines; 8 data bits, no parity, 1 stop bit.
 const BAUD: u32 = 115_200;
 
-/// The watchdog's patience, by its nominal clock. It must be longer than the chip takes to erase a
-/// sector, 4 s at most, when its clock is fastest: 47 kHz instead of 32 kHz make 5.4 s of this.
+/// The watchdog's time-out at its nominal clock. It must exceed the time to erase a sector, 4 s at
+/// most, even at the fastest clock: 47 kHz instead of 32 kHz shortens it to 5.4 s.
 const WATCHDOG_MS: u32 = 8_000;
 
 /// SysTick counts every eighth tick of the processor's clock.
@@ -48,13 +47,13 @@ fn main() -> ! {
     let (Some(mut processor), Some(chip)) = peripherals else {
         faults::stand()
     };
-    // By the chip's own oscillator: boards have various crystals, or none.
+    // Uses the chip's internal oscillator: boards have various crystals, or none.
     let mut rcc = chip.RCC.freeze(Config::hsi().sysclk(CLOCK_HZ.Hz()));
     let restarted_by_watchdog = rcc.csr().read().wdgrstf().bit_is_set();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
 
     // PA2, PA3: the line to the host. PB11: the range-and-bearing module. PC6, PC7: speed of the
-    // left and right wheel; PC8, PC9: high if it turns ahead.
+    // left and right wheel; PC8, PC9: high if the wheel turns forwards.
     let a = chip.GPIOA.split(&mut rcc);
     let b = chip.GPIOB.split(&mut rcc);
     let c = chip.GPIOC.split(&mut rcc);
@@ -87,7 +86,8 @@ fn main() -> ! {
     systick.enable_interrupt();
     systick.enable_counter();
 
-    // For a debugger: it may look while the processor sleeps, and stop it for any time.
+    // For a debugger: it may read memory while the processor sleeps, and halt the processor for any
+    // time.
     chip.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
     let mut watchdog = IndependentWatchdog::new(chip.IWDG);
     watchdog.stop_on_debug(&chip.DBGMCU, true);

@@ -1,7 +1,7 @@
 //! Two wheels behind a motor driver that takes a speed (PWM) and a direction for each.
 //!
-//! Nothing measures how far they turn: what the numbers here make of a move is what the robot
-//! does. They are what a builder fills in first.
+//! Nothing measures how far they turn: the length of a move depends only on the constants here,
+//! which a builder must set first.
 
 use firmware_example::robot::Motion;
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
@@ -10,7 +10,7 @@ use stm32f4xx_hal::timer::pwm::ErasedChannel;
 
 use crate::board::{CELL_MM, CONTROL_HZ};
 
-/// Frequency of the PWM: too high to be heard.
+/// Frequency of the PWM, above the audible range.
 pub(crate) const PWM_HZ: u32 = 20_000;
 
 /// Speed of a wheel on the ground at full duty, in mm/s.
@@ -20,13 +20,17 @@ const TRACK_MM: f32 = 53.0;
 
 /// Duties in 1/1000. A move takes one control period.
 const AHEAD: i16 = permille(CELL_MM * CONTROL_HZ as f32);
-/// A quarter turn on the spot: each wheel goes an eighth of the circle of the track.
+/// A quarter turn on the spot: each wheel travels a quarter of the circle whose diameter is the
+/// track.
 const TURN: i16 = permille(core::f32::consts::FRAC_PI_4 * TRACK_MM * CONTROL_HZ as f32);
 
 /// The duty for a speed in mm/s.
 const fn permille(mm_per_s: f32) -> i16 {
     let duty = 1000.0 * mm_per_s / FULL_MM_PER_S;
-    assert!(duty > 0.0 && duty <= 1000.0, "the wheels are not so fast");
+    assert!(
+        duty > 0.0 && duty <= 1000.0,
+        "the wheels cannot turn that fast"
+    );
     duty as i16
 }
 
@@ -34,7 +38,7 @@ const fn permille(mm_per_s: f32) -> i16 {
 pub(crate) struct Wheel {
     /// Its PWM channel.
     pub(crate) speed: ErasedChannel<TIM3>,
-    /// High if it turns ahead.
+    /// High if the wheel turns forwards.
     pub(crate) ahead: ErasedPin<Output>,
 }
 

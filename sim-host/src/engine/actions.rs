@@ -6,8 +6,8 @@ use super::robot_word::{ACTION, HEADING_SHIFT};
 use super::window::{WINDOWS, WindowOrder};
 use minimal_surprise_controller::{Action, Controller, Turn};
 
-/// What to do, as the top byte of what is added to a robot word: bit 7 the action, bits 5 and 6
-/// the turn (0, 1 or 3 quarters), and bit 0 set while nobody has asked.
+/// An action as the top byte of the addend for a robot word: bit 7 is the action, bits 5 and 6 are
+/// the turn (0, 1 or 3 quarters), and bit 0 is set until the entry is computed.
 type Entry = u8;
 
 const NOT_ASKED: Entry = 1;
@@ -32,10 +32,10 @@ const fn to_entry(action: Action, turn: Turn) -> Entry {
     }
 }
 
-/// The answers of one action network, worked out when first asked for, or all at once.
+/// The actions of one action network, computed on first use or all at once.
 #[derive(Clone, Debug)]
 pub(super) struct ActionTable {
-    /// An entry a window, and three bytes so that each can be read as part of a word.
+    /// One entry per window, plus three bytes so that each entry can be read as part of a word.
     entries: Vec<Entry>,
 }
 
@@ -46,8 +46,8 @@ impl ActionTable {
         }
     }
 
-    /// Forgets the last genome. Where the path has the means, all entries are worked out at once;
-    /// elsewhere few enough are ever asked for.
+    /// Replaces the last genome. On AVX-512 all entries are computed at once; on other paths on
+    /// first use, because few are used.
     pub(super) fn prepare(&mut self, path: Path, controller: &Controller, order: &WindowOrder) {
         match path {
             #[cfg(target_arch = "x86_64")]
@@ -56,13 +56,13 @@ impl ActionTable {
         }
     }
 
-    /// All entries, and three bytes more.
+    /// All entries, plus three bytes.
     #[cfg(target_arch = "x86_64")]
     pub(super) fn entries(&self) -> &[Entry] {
         &self.entries
     }
 
-    /// The entry of a window, by asking the controller if need be.
+    /// The entry of a window, computed by the controller if missing.
     #[inline]
     pub(super) fn get(&mut self, window: u16, order: &WindowOrder, controller: &Controller) -> u32 {
         let entry = &mut self.entries[usize::from(window)];
@@ -84,7 +84,7 @@ mod tests {
     use rand_core::Rng as _;
 
     #[test]
-    fn all_windows_of_random_genomes_are_decided_as_the_controller_decides() {
+    fn all_windows_of_random_genomes_have_the_actions_of_the_controller() {
         for (seed, topology) in (0..).zip(Topology::ALL) {
             let mut rng = SeedTree::new(seed).stream(Purpose::InitialGenome, 0, 0);
             let weights: Vec<i16> = (0..topology.weights())

@@ -1,23 +1,23 @@
-//! Occupancy as rows of bits, once along x and once along y, so that a robot of any heading finds
-//! its window in three neighbouring lines.
+//! Occupancy as rows of bits, once along x and once along y, so that the window of a robot with any
+//! heading is in three neighbouring lines.
 //!
-//! Facing east or north, a window is read as it lies: `rows` has the lines y = 0, 1, … with x
-//! growing along them; `columns` has the lines x = W − 1, W − 2, … with y growing along them, so
-//! that in both the line before is on the robot's right. Facing west or south the window is the
-//! same cells half a turn on: its 15 bits in reverse order.
+//! If the robot faces east or north, its window is read directly: `rows` has the lines y = 0, 1, …
+//! with x increasing along them; `columns` has the lines x = W − 1, W − 2, … with y increasing
+//! along them, so that in both the line before is on the robot's right. If the robot faces west or
+//! south, the window is rotated by half a turn: its 15 bits are in reverse order.
 
 use super::robot_word;
 use crate::torus::Grid;
 
-/// Lines of bits with a border that repeats what lies across the edges: two bits at either end of
-/// a line, one line before the first and after the last.
+/// Lines of bits with a border that repeats the cells across the edges: two bits at either end of a
+/// line, one line before the first and one after the last.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plane {
     /// Cells along a line.
     side: u32,
     lines: u32,
     words_per_line: usize,
-    /// One word more than the lines have: any five bits may be read from two words.
+    /// One word more than the lines need, because any five bits may be read from two words.
     bits: Vec<u32>,
 }
 
@@ -25,7 +25,7 @@ pub(super) struct Plane {
 const BORDER: u32 = 2;
 
 impl Plane {
-    /// Longest lines that take one word.
+    /// Length of the longest lines that fit into one word.
     pub(super) const SIDE_MAX_ONE_WORD: u32 = 32 - 2 * BORDER;
 
     fn reset(&mut self, side: u32, lines: u32) {
@@ -37,7 +37,7 @@ impl Plane {
             .resize((lines as usize + 2) * self.words_per_line + 1, 0);
     }
 
-    /// Line −1 first, each of [`Plane::words_per_line`] words, and one word more.
+    /// The lines, starting at −1, each of [`Plane::words_per_line`] words, plus one word.
     pub(super) fn words(&self) -> &[u32] {
         &self.bits
     }
@@ -54,7 +54,7 @@ impl Plane {
         self.lines
     }
 
-    /// Word and bit of a cell. `ONE_WORD`: lines are known to be single words.
+    /// Word and bit of a cell. `ONE_WORD`: all lines are single words.
     #[inline]
     fn place<const ONE_WORD: bool>(&self, line: u32, along: u32) -> (usize, u32) {
         let bit = along + BORDER;
@@ -92,7 +92,7 @@ impl Plane {
         window
     }
 
-    /// Copies to the border what lies across the edges.
+    /// Copies the cells across the edges to the border.
     fn close_edges(&mut self) {
         let words_per_line = self.words_per_line;
         let lines = self.lines as usize;
@@ -143,12 +143,12 @@ impl Board {
         self.width.max(self.height) <= Plane::SIDE_MAX_ONE_WORD
     }
 
-    /// Puts a robot on an empty board. Borders stay as they are.
+    /// Places a robot on an empty board. Does not update borders.
     pub(super) fn place(&mut self, robot: u32) {
         self.flip::<false>(robot_word::x(robot), robot_word::y(robot));
     }
 
-    /// Puts a robot on the cell or takes it away.
+    /// Places a robot on a cell or removes it.
     #[inline]
     fn flip<const ONE_WORD: bool>(&mut self, x: u32, y: u32) {
         self.rows.flip::<ONE_WORD>(y, x);
@@ -177,8 +177,8 @@ impl Board {
         }
     }
 
-    /// Moves each of the robots listed one cell ahead unless the cell is taken, one after the
-    /// other. Borders stay as they are.
+    /// Moves each of the listed robots one cell ahead, one after the other, unless the cell is
+    /// taken. Does not update borders.
     pub(super) fn advance(&mut self, movers: &[u32], robots: &mut [u32]) {
         if self.is_narrow() {
             self.advance_each::<true>(movers, robots);
@@ -188,7 +188,7 @@ impl Board {
     }
 
     fn advance_each<const ONE_WORD: bool>(&mut self, movers: &[u32], robots: &mut [u32]) {
-        // Headings are too mixed for branches to be foreseen, so there is none on them.
+        // Headings are too mixed for branch prediction, so there are no branches on them.
         static AHEAD: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
         let (width, height) = (self.width, self.height);
         let across_the_edge = |to: u32, side: u32| {

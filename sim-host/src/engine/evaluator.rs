@@ -1,4 +1,4 @@
-//! Evaluations by a chosen engine.
+//! Evaluations with a choice of engine.
 
 use super::actions::ActionTable;
 use super::every_step::Groups;
@@ -20,30 +20,30 @@ use crate::world::check_poses;
 use minimal_surprise_controller::{Controller, Genome, SensorModel};
 use std::sync::OnceLock;
 
-/// Longest recording that is kept as a whole, in words of four robot-steps: 8 MB.
+/// Longest recording that is stored as a whole, in words of four robot-steps: 8 MB.
 const RECORDING_WORDS_MAX: usize = 1 << 20;
-/// Recordings worked off part by part have about this many words: they stay in the cache.
+/// Recordings processed in parts have about this many words, so that they stay in the cache.
 const PART_WORDS: usize = 1 << 15;
-/// But no part is shorter than this, or prediction states would go in and out of the cache more
-/// often than it is worth.
+/// Minimum length of a part: with shorter ones, prediction states would be moved in and out of the
+/// cache too often.
 const PART_BLOCKS_MIN: usize = 4;
-/// Robots of small swarms that are worked off together.
+/// Robots of small swarms that are processed together.
 const ROBOTS_TOGETHER: usize = 1 << 12;
-/// Most flips kept for a trial: 8 MB.
+/// Maximum number of flips stored for a trial: 8 MB.
 const FLIPS_MAX: usize = 1 << 22;
 
-/// Which program evaluates. All give the same results.
+/// Which engine evaluates. All give the same results.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Engine {
-    /// The straight one: [`evaluation::evaluate`].
+    /// The reference engine: [`evaluation::evaluate`].
     Plain,
-    /// This module.
+    /// The fast engine, this module.
     #[default]
     Fast,
 }
 
-/// The trials of a generation, and what the fast engine prepares for all of its genomes at once.
-/// May be shared between threads.
+/// The trials of a generation, and what the fast engine prepares once for all of its genomes. Can
+/// be shared between threads.
 #[derive(Debug)]
 pub struct TrialSet {
     scenario: Scenario,
@@ -56,7 +56,8 @@ impl TrialSet {
     /// Trials for genomes of the given sensor model.
     ///
     /// # Panics
-    /// If there is no trial, or a trial's poses are not as many as the scenario has robots or do not fit its grid.
+    /// If there is no trial, or a trial's poses do not match the scenario's number of robots or its
+    /// grid.
     #[must_use]
     pub fn new(scenario: Scenario, model: SensorModel, trials: Vec<Trial>) -> Self {
         assert!(!trials.is_empty(), "there is at least one trial");
@@ -108,7 +109,7 @@ impl TrialSet {
     }
 }
 
-/// Evaluates genomes; holds what is used again from one to the next. One a thread.
+/// Evaluates genomes and keeps buffers between evaluations. Use one per thread.
 pub struct Evaluator {
     engine: Engine,
     skips_repeats: bool,
@@ -121,7 +122,7 @@ pub struct Evaluator {
 }
 
 impl Evaluator {
-    /// An evaluator that runs on the given path; the plain engine has none and ignores it.
+    /// An evaluator that uses the given path; the plain engine ignores it.
     #[must_use]
     pub fn new(engine: Engine, path: Path) -> Self {
         Self {
@@ -136,15 +137,15 @@ impl Evaluator {
         }
     }
 
-    /// Whether to go on by counting once a world, or a robot in it, repeats itself. On unless
-    /// turned off, which changes no result.
+    /// Whether to skip computation once a world, or a robot in it, repeats itself. On by default;
+    /// does not change results.
     #[must_use]
     pub fn with_repeats_skipped(mut self, skips: bool) -> Self {
         self.skips_repeats = skips;
         self
     }
 
-    /// A genome's fitness over all trials: what [`evaluation::evaluate`] gives.
+    /// A genome's fitness over all trials, as returned by [`evaluation::evaluate`].
     ///
     /// # Panics
     /// If the trials are for another sensor model.
@@ -163,8 +164,8 @@ impl Evaluator {
         }
     }
 
-    /// How the robots of one repetition move, and where they end: what [`evaluation::motion`]
-    /// gives; the fast engine runs the world alone, without predictions.
+    /// How the robots of one repetition move, and their final poses, as returned by
+    /// [`evaluation::motion`]. The fast engine runs only the world, without predictions.
     ///
     /// # Panics
     /// If the trials are for another sensor model, or there is no such repetition.

@@ -1,10 +1,10 @@
-//! Predictions step by step, for noise and for swarms too large to record as a whole: robots stay
-//! in their lanes, and recordings are worked off part by part.
+//! Predictions step by step, for noisy swarms and for swarms too large to record as a whole: robots
+//! stay in their lanes, and recordings are processed part by part.
 
 use super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, Predictor};
 use super::recording::Recording;
 
-/// The robots of some repetitions, 32 to a group, whose last group may not be full.
+/// The robots of some repetitions in groups of 32; the last group may be incomplete.
 #[derive(Default)]
 pub(super) struct Groups {
     started: bool,
@@ -21,7 +21,7 @@ impl Groups {
         self.matched.resize(robots.next_multiple_of(LANES), 0);
     }
 
-    /// Goes on by the `steps` recorded.
+    /// Processes the `steps` recorded.
     pub(super) fn advance(&mut self, predictor: &Predictor, recording: &Recording, steps: usize) {
         let whole_blocks = steps / BLOCK_STEPS;
         let robots = recording.robots();
@@ -58,7 +58,7 @@ impl Groups {
         self.started = true;
     }
 
-    /// Matches of robot `index`.
+    /// Matches of each robot.
     pub(super) fn matched(&self) -> &[u64] {
         &self.matched
     }

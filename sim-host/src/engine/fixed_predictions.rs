@@ -1,9 +1,9 @@
-//! Predefined predictions: there is no network, so every block matches where it is as foretold.
+//! Predefined predictions: there is no network, so blocks are compared with a constant.
 
 use super::lanes::BLOCK_STEPS;
 use super::recording::Recording;
 
-/// Counts the matches of every robot over the recorded `steps` and hands them to `add`.
+/// Counts the matches of every robot over the recorded `steps` and passes them to `add`.
 pub(super) fn count_matches(
     recording: &Recording,
     steps: usize,

@@ -9,9 +9,9 @@ use minimal_surprise_controller::SensorBits;
 pub(super) enum FlipSource<'a> {
     /// No noise.
     None,
-    /// A row a step, drawn before.
+    /// One row per step, already drawn.
     Known(&'a [u16]),
-    /// Too many to keep.
+    /// Too many to store; drawn on demand.
     Drawn(Box<Drawer<'a>>),
 }
 

@@ -1,7 +1,7 @@
-//! Lanes: the prediction networks of 32 robots, worked out side by side, four steps at a time.
+//! Lanes: the prediction networks of 32 robots, computed side by side, four steps at a time.
 //!
-//! A robot's inputs of four steps are one 64-bit word, a *block*. Which robot is in which lane, and
-//! at which time, is the caller's business: lanes know nothing of each other.
+//! A robot's inputs of four steps are one 64-bit word, a *block*. The caller decides which robot is
+//! in which lane, and at which time: lanes are independent of each other.
 
 use super::network::PredictionWeights;
 use super::path::Path;
@@ -17,23 +17,24 @@ pub(super) const BLOCK_STEPS: usize = 4;
 /// Pairs of hidden neurons: factors come in pairs, because that is how vector units multiply.
 pub(super) const PAIRS: usize = MAX_HIDDEN / 2;
 
-/// What 32 robots remember from step to step: hidden activations 2p (low half) and 2p + 1 (high
-/// half) of pair p, lane by lane.
+/// The state of 32 robots between steps: hidden activations 2p (low half) and 2p + 1 (high half) of
+/// pair p, lane by lane.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct Lanes {
     pub(super) hidden: [[u32; LANES]; PAIRS],
 }
 
-/// What 32 robots meet in a block.
+/// The inputs of 32 robots in a block.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct Blocks {
     /// Their inputs, the first step in the lowest 16 bits.
     pub(super) inputs: [u64; LANES],
-    /// A bit for every lane whose robot is before its first step: its prediction is given.
+    /// One bit per lane, set if its robot is before its first step, so that its prediction is
+    /// fixed.
     pub(super) starting: u32,
-    /// Matches in this many steps (0 to 3) are also counted by themselves.
+    /// Matches in this many steps (0 to 3) are also counted separately.
     pub(super) first_steps: usize,
 }
 
@@ -42,7 +43,7 @@ pub(super) struct Blocks {
 #[repr(align(64))]
 pub(super) struct Matches {
     pub(super) block: [u16; LANES],
-    /// In the first few steps only.
+    /// In the first `first_steps` steps only.
     pub(super) first_steps: [u16; LANES],
 }
 
@@ -82,8 +83,8 @@ impl Predictor {
         }
     }
 
-    /// Four steps of all lanes. Returns a bit for every lane whose hidden activations are what they
-    /// were before.
+    /// Runs four steps of all lanes. Returns one bit per lane, set if its hidden activations have
+    /// not changed.
     #[inline]
     pub(super) fn run_block(
         &self,

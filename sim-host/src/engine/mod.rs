@@ -1,26 +1,26 @@
 //! The fast engine: the same results as [`evaluation::evaluate`](crate::evaluation::evaluate), bit
-//! for bit, in a fraction of the time. Every trick is here and nowhere else.
+//! for bit, in a fraction of the time. All optimisations are in this module.
 //!
-//! | trick | where |
+//! | optimisation | where |
 //! |---|---|
-//! | a robot's surroundings cut out of rows of bits | `board`, `window` |
-//! | a robot in one word, states compared as words | `robot_word`, `swarm` |
-//! | actions by table, filled as asked or all at once | `actions` |
-//! | the world first, predictions from what it wrote down | `recording` |
-//! | a world that repeats itself stops | `repeats` |
-//! | a robot that sees and foresees the same goes on by counting | `skipping` |
-//! | predictions of 32 robots side by side | `lanes`, `network`, `portable`, `x86` |
-//! | noise drawn once a generation | `flips` |
-//! | predictions that are fixed are compared four steps at a time | `fixed_predictions` |
-//! | large or noisy swarms in parts that stay in the cache | `every_step` |
+//! | the cells around a robot are cut out of rows of bits | `board`, `window` |
+//! | a robot is one word, states are compared as words | `robot_word`, `swarm` |
+//! | actions come from a table, filled on demand or all at once | `actions` |
+//! | the world runs first, predictions are computed from its recording | `recording` |
+//! | a world that repeats a state is not run further | `repeats` |
+//! | stretches in which a robot's inputs and predictions repeat are only counted | `skipping` |
+//! | predictions of 32 robots are computed side by side | `lanes`, `network`, `portable`, `x86` |
+//! | noise is drawn once per generation | `flips` |
+//! | fixed predictions are compared four steps at a time | `fixed_predictions` |
+//! | large or noisy swarms are processed in parts that stay in the cache | `every_step` |
 //!
-//! `evaluator` puts them together, and `path` chooses the instructions.
+//! `evaluator` combines them, and `path` chooses the instructions.
 #![cfg_attr(
     not(target_arch = "x86_64"),
     allow(
         dead_code,
         unused_variables,
-        reason = "some is for the vector paths only"
+        reason = "some items are used by the vector paths only"
     )
 )]
 

@@ -1,7 +1,7 @@
 //! The prediction network in window order, ready to be laid out for a vector unit.
 //!
-//! An input neuron has two values, so the sum that a hidden neuron makes of its inputs is a
-//! constant and one addend for each bit that is set; sums are exact, whatever the order.
+//! An input neuron has two values, so the sum of a hidden neuron's inputs is a constant plus one
+//! addend for each bit that is set; sums are exact in any order.
 
 use super::window::{WINDOW_BITS, WindowOrder};
 use minimal_surprise_controller::controller::spread;
@@ -9,7 +9,7 @@ use minimal_surprise_controller::fixed::ROUNDING_Q24;
 use minimal_surprise_controller::network::{MAX_HIDDEN, MAX_OUTPUTS, Network, SELF_LOOP};
 use minimal_surprise_controller::{Controller, Topology};
 
-/// What a hidden neuron makes of a window, Q24.
+/// The input sum of a hidden neuron as a function of the window, Q24.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct HiddenSum {
     /// The sum for an empty window, the rounding term included.
@@ -38,11 +38,11 @@ impl HiddenSum {
         sums
     }
 
-    /// What the bits from `first` on add to the sum, for each of their 2ⁿ = `N` values. The sum of
-    /// an empty window is part of the first table.
+    /// What the n bits starting at `first` add to the sum, for each of their 2ⁿ = `N` values. The
+    /// first table includes the sum of an empty window.
     ///
-    /// A table alone need not fit `i32`; its values and the totals are right modulo 2³², and the
-    /// sums themselves fit.
+    /// The values of one table may exceed `i32`; they and the totals are correct modulo 2³², and
+    /// the sums themselves fit.
     pub(super) fn table<const N: usize>(&self, first: usize) -> [i32; N] {
         let mut table = [0; N];
         table[0] = if first == 0 { self.empty } else { 0 };
@@ -59,8 +59,8 @@ impl HiddenSum {
     }
 }
 
-/// The window bits that a robot predicts *not* occupied before its first step. In predictions so
-/// put, a bit matches where it differs from the next reading.
+/// The window bits that a robot predicts *not* occupied before its first step. In this form, a
+/// predicted bit matches if it differs from the next reading.
 pub(super) fn expected_empty_at_start(topology: Topology, order: &WindowOrder) -> u16 {
     order.sensors() & !order.window(topology.fixed().bits())
 }

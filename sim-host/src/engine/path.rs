@@ -1,4 +1,4 @@
-//! Code paths: the same results by the instructions of different processors.
+//! Code paths: the same results with the instructions of different processors.
 
 #[cfg(target_arch = "x86_64")]
 use super::x86;
@@ -6,10 +6,10 @@ use super::x86;
 /// Environment variable that forces a path: `portable`, `avx2` or `avx512`.
 pub const PATH_VARIABLE: &str = "MINIMAL_SURPRISE_PATH";
 
-/// The instructions that the fast engine uses. All give the same results.
+/// The instructions that the fast engine uses. All paths give the same results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Path {
-    /// What every processor has.
+    /// Instructions that every processor has.
     Portable,
     /// AVX2: predictions of 16 robots at once.
     #[cfg(target_arch = "x86_64")]
@@ -20,7 +20,7 @@ pub enum Path {
     Avx512(x86::Avx512),
 }
 
-/// This processor cannot run the path, or there is none of this name.
+/// This processor cannot run the path, or no path has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{PATH_VARIABLE} names the path {0:?}; this processor has {list}", list = Path::names())]
 pub struct PathError(String);
@@ -45,10 +45,10 @@ impl Path {
         Self::available().pop().unwrap_or(Self::Portable)
     }
 
-    /// The path of a name.
+    /// The path with this name.
     ///
     /// # Errors
-    /// [`PathError`] if this processor has no path of the name.
+    /// [`PathError`] if this processor has no path with this name.
     pub fn named(name: &str) -> Result<Self, PathError> {
         Self::available()
             .into_iter()
@@ -56,7 +56,7 @@ impl Path {
             .ok_or_else(|| PathError(name.to_owned()))
     }
 
-    /// The path that [`PATH_VARIABLE`] names, else the best.
+    /// The path that [`PATH_VARIABLE`] names; if it is not set, the best.
     ///
     /// # Errors
     /// [`PathError`] if the variable names a path that this processor does not have.

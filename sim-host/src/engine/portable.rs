@@ -1,5 +1,5 @@
-//! Predictions without vector instructions of any one processor: lane after lane, the neurons of a
-//! layer side by side in arrays.
+//! Predictions without processor-specific vector instructions: lane after lane, with the neurons of
+//! a layer side by side in arrays.
 
 use super::lanes::{BLOCK_STEPS, Blocks, Lanes, Matches};
 use super::network::PredictionWeights;
@@ -14,7 +14,7 @@ pub(super) struct Network {
     sensors: u16,
     expected_empty_at_start: u16,
     hidden: usize,
-    /// For each value of each five bits of a window, what they add to every hidden sum.
+    /// What each five bits of a window add to every hidden sum, for each of their values.
     inputs: [[[i32; WIDTH]; 32]; 3],
     self_loops: [i32; WIDTH],
     /// The weights of each output and the window bit it predicts.

@@ -1,7 +1,7 @@
-//! Recordings: what the robots' prediction networks see, written down by the world as it runs.
+//! Recordings: the inputs of the robots' prediction networks, recorded while the world runs.
 //!
-//! A robot's inputs lie together, a block of four steps a word, so that predictions can be worked
-//! out robot by robot, each at its own pace.
+//! A robot's inputs are stored together, one word per block of four steps, so that predictions can
+//! be computed robot by robot, each at its own pace.
 
 use super::flips::FlipSource;
 use super::lanes::BLOCK_STEPS;
@@ -36,7 +36,7 @@ impl Recording {
         &self.words[robot * self.blocks..][..self.blocks]
     }
 
-    /// Fills the blocks of some robots from `block` on with what they have `period` blocks before.
+    /// Fills the blocks of some robots, starting at `block`, by repeating the last `period` blocks.
     fn repeat(&mut self, first: usize, robots: usize, block: usize, period: usize) {
         let blocks = self.blocks;
         for words in self.of_robots(first, robots).chunks_exact_mut(blocks) {
@@ -55,18 +55,18 @@ impl Recording {
         }
     }
 
-    /// All blocks, robot after robot.
+    /// All blocks, robot by robot.
     pub(super) fn words(&self) -> &[u64] {
         &self.words
     }
 
-    /// The same for some robots in a row.
+    /// The blocks of several consecutive robots.
     fn of_robots(&mut self, first: usize, robots: usize) -> &mut [u64] {
         &mut self.words[first * self.blocks..][..robots * self.blocks]
     }
 }
 
-/// Runs worlds and writes recordings.
+/// Runs worlds and records them.
 pub(super) struct Recorder {
     pub(super) path: Path,
     rows: [Vec<u16>; BLOCK_STEPS],
@@ -82,9 +82,9 @@ impl Recorder {
         }
     }
 
-    /// Runs a swarm from its start for `steps` and records it, its first robot being `first`.
+    /// Runs a swarm from its start for `steps` and records it, starting at robot index `first`.
     ///
-    /// The world stops as soon as it repeats itself; what follows is copied.
+    /// The world stops as soon as it repeats a state; the remaining blocks are copied.
     pub(super) fn record_until_it_repeats(
         &mut self,
         swarm: &mut Swarm,
@@ -115,7 +115,7 @@ impl Recorder {
         }
     }
 
-    /// Runs a swarm for the given steps and records them from block 0 on.
+    /// Runs a swarm for the given steps and records them, starting at block 0.
     pub(super) fn record_steps(
         &mut self,
         swarm: &mut Swarm,
@@ -139,8 +139,8 @@ impl Recorder {
         }
     }
 
-    /// One block of all robots; `words[0]` is the first robot's, and the others' follow `stride`
-    /// apart.
+    /// Records one block of all robots; `words[0]` is the first robot's, and the others' follow
+    /// `stride` apart.
     fn record_block(
         &mut self,
         swarm: &mut Swarm,

@@ -1,5 +1,5 @@
-//! Repeated states: the world is deterministic, so once all robot words are what they were at an
-//! earlier time, everything from then on repeats for good.
+//! Repeated states: the world is deterministic, so once all robot words equal those of an earlier
+//! time, everything repeats from then on.
 //!
 //! States are looked up by hash and then compared in full.
 
@@ -16,7 +16,7 @@ impl History {
         self.states.clear();
     }
 
-    /// The place of this state among those before, if it has been there; else it is added to them.
+    /// Returns the index of an equal earlier state; if there is none, adds the state.
     pub(super) fn find_or_add(&mut self, state: &[u32]) -> Option<usize> {
         let hash = hash(state);
         for (place, _) in self
@@ -36,7 +36,7 @@ impl History {
     }
 }
 
-/// A sum in which every robot has its own odd factor, so that it is worked out in any order.
+/// A sum in which every robot has its own odd factor, so that it can be computed in any order.
 fn hash(state: &[u32]) -> u32 {
     let mut factor = 0x9e37_79b9_u32;
     let mut sum = 0_u32;
@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn states_of_equal_hashes_are_told_apart() {
+    fn states_with_equal_hashes_are_distinguished() {
         let mut history = History::default();
         history.find_or_add(&[7, 8]);
         history.hashes[0] = hash(&[9, 9]);

@@ -1,4 +1,4 @@
-//! A robot in one word: everything about it that the world depends on.
+//! A robot as one word: everything about it that affects the world.
 //!
 //! ```text
 //! bits 0–13   x
@@ -8,8 +8,8 @@
 //! bit  31     last action, 1 = turn
 //! ```
 //!
-//! A turn is an addition at bit 29; what it carries out of bit 30 falls on the action, which is
-//! set anew in the same step. Two swarms are in the same state exactly if their words are equal.
+//! A turn is an addition at bit 29; a carry out of bit 30 changes the action, which is overwritten
+//! in the same step. Two swarms are in the same state if and only if their words are equal.
 
 use crate::torus::{Heading, Pose};
 
@@ -24,7 +24,7 @@ pub(super) const ACTION: u32 = 1 << 31;
 
 const _: () = assert!(crate::torus::SIDE_MAX == 1 << COORDINATE_BITS);
 
-/// A robot that has not moved yet.
+/// A robot before its first step.
 pub(super) fn from_pose(pose: Pose) -> u32 {
     position(pose.x.into(), pose.y.into()) | (pose.heading as u32) << HEADING_SHIFT
 }
@@ -38,7 +38,7 @@ pub(super) fn pose(word: u32) -> Pose {
     }
 }
 
-/// Coordinates in their places.
+/// Coordinates at their bit positions.
 pub(super) fn position(x: u32, y: u32) -> u32 {
     x | y << COORDINATE_BITS
 }

@@ -1,14 +1,14 @@
-//! Predictions without noise: stretches in which nothing changes are counted, not worked out.
+//! Predictions without noise: stretches in which nothing changes are counted, not computed.
 //!
-//! Once a robot's inputs are the same block over and over, its hidden activations soon are after
-//! a block what they were before it. From then on until its inputs change every such block
-//! matches in as many bits as the last one. Each lane is at its own place in the recording of its
-//! own robot, skips by itself, and takes the next robot when it has come to the end.
+//! If the same block of inputs repeats, a robot's hidden activations soon are the same before and
+//! after a block. From then on, until its inputs change, every block has as many matching bits as
+//! the last one. Each lane has its own position in the recording of its own robot, skips
+//! independently, and takes the next robot at the end.
 
 use super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, Predictor};
 use super::recording::Recording;
 
-/// Counts the matches of every robot recorded and hands them to `add`.
+/// Counts the matches of every recorded robot and passes them to `add`.
 pub(super) fn count_matches(
     predictor: &Predictor,
     recording: &Recording,
@@ -26,9 +26,9 @@ pub(super) fn count_matches(
         starting: 0,
         first_steps: last_steps,
     };
-    // Lanes that have a robot, and those of them whose next block is their last and not whole.
+    // Lanes that have a robot, and those of them whose next block is the last, incomplete one.
     let (mut busy, mut ending) = (0_u32, 0_u32);
-    // Robots are taken in turn; whoever comes first takes the first.
+    // Robots are assigned to lanes in order.
     let mut waiting = 0..recording.robots();
     let mut take = |place: &mut Place| {
         let robot = waiting.next()?;
@@ -52,11 +52,12 @@ pub(super) fn count_matches(
         ending = busy;
     }
     while busy != 0 {
-        // A robot's first prediction is not made by its network, so its first block stands alone.
+        // A robot's first prediction does not come from its network, so its first block cannot be
+        // repeated.
         let unchanged = predictor.run_block(&mut lanes, &next, &mut matches) & !next.starting;
         next.starting = 0;
 
-        // What every lane does: count, and go on to the next block.
+        // Every lane counts its matches and moves to the next block.
         let (mut at_end, mut alike) = (0, 0);
         for (lane, place) in places.iter_mut().enumerate() {
             place.matched += u64::from(matches.block[lane]);
@@ -67,7 +68,7 @@ pub(super) fn count_matches(
             next.inputs[lane] = inputs;
         }
 
-        // What some do: skip, or come to the end.
+        // Some lanes skip blocks or reach the end.
         for lane in ones(busy & (at_end | unchanged & alike)) {
             let place = &mut places[lane];
             if ending >> lane & 1 == 1 {
@@ -104,18 +105,18 @@ pub(super) fn count_matches(
     }
 }
 
-/// Where a lane is.
+/// The position of a lane.
 #[derive(Clone, Copy, Default)]
 struct Place {
     robot: usize,
-    /// The next block, among all those recorded.
+    /// Index of the next block among all recorded blocks.
     word: usize,
-    /// Where the robot's whole blocks end.
+    /// End of the robot's whole blocks.
     end: usize,
     matched: u64,
 }
 
-/// Numbers of the bits that are set.
+/// Indices of the bits that are set.
 fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let lowest = (bits != 0).then(|| bits.trailing_zeros() as usize);
@@ -124,7 +125,7 @@ fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-/// How many blocks at the start are `block`.
+/// How many leading blocks equal `block`.
 fn alike_at_start(blocks: &[u64], block: u64) -> usize {
     let (chunks, _) = blocks.as_chunks::<8>();
     let all_alike = |chunk: &&[u64; 8]| chunk.iter().fold(0, |d, &b| d | (b ^ block)) == 0;

@@ -1,7 +1,7 @@
 //! The world of one repetition: robots as words, the board as bits.
 //!
-//! The prediction network never acts back on the world, so a swarm runs on action tables alone
-//! and writes down each robot's inputs; predictions are worked out from these afterwards.
+//! The prediction network never affects the world, so a swarm runs with action tables alone and
+//! records each robot's inputs; predictions are computed from them afterwards.
 
 use super::actions::ActionTable;
 use super::board::Board;
@@ -13,7 +13,7 @@ use super::x86;
 use crate::torus::{Grid, Pose};
 use minimal_surprise_controller::Controller;
 
-/// Robot words come in multiples of this; the last ones may be of no robot.
+/// Robot words are padded to a multiple of this number.
 pub(super) const ROBOTS_AT_ONCE: usize = 16;
 
 /// What all swarms of an evaluation share: the genome's behaviour.
@@ -34,7 +34,7 @@ pub(super) struct Swarm {
 }
 
 impl Swarm {
-    /// Puts the robots at their starts.
+    /// Places the robots at their starting poses.
     pub(super) fn reset(&mut self, grid: Grid, starts: &[Pose]) {
         self.robots = starts.len();
         self.board.reset(grid);
@@ -50,13 +50,13 @@ impl Swarm {
         self.movers.resize(padded + ROBOTS_AT_ONCE, 0);
     }
 
-    /// Everything that the swarm's future depends on, noise aside.
+    /// Everything that the swarm's future depends on, except noise.
     pub(super) fn state(&self) -> &[u32] {
         &self.words[..self.robots]
     }
 
-    /// One step. `flips` are the robots' flipped bits in window order; `inputs` receives the
-    /// windows that their prediction networks see, the action just chosen in its place.
+    /// Runs one step. `flips` are the robots' flipped bits in window order; `inputs` receives the
+    /// windows for their prediction networks, with the action just chosen.
     pub(super) fn step(
         &mut self,
         path: Path,
@@ -89,7 +89,7 @@ impl Swarm {
         self.board.advance(&self.movers[..movers], &mut self.words);
     }
 
-    /// Turns those who turn and lists those who may move; the number of these is returned.
+    /// Turns the robots that turn and lists those that may move; returns the number of the latter.
     fn sense_and_decide(
         &mut self,
         behaviour: &mut Behaviour<'_>,
@@ -115,5 +115,5 @@ impl Swarm {
     }
 }
 
-/// Shift that takes the action of a robot word to its place in the window.
+/// Shift from the action bit of a robot word to the action bit of a window.
 const ENTRY_TO_WINDOW: u32 = ACTION.trailing_zeros() - ACTION_BIT.trailing_zeros();

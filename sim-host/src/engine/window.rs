@@ -1,10 +1,10 @@
 //! The window: the three by five cells around a robot as one word, its rows along the heading.
 //!
-//! A robot senses by cutting its window out of rows of bits, so the engine works in window order
+//! A robot senses by cutting its window out of rows of bits, so the engine uses window order
 //! throughout: action table, prediction network and score are rearranged once, and no reading is
-//! ever put into sensor order. Bit `5·(left + 1) + ahead + 2` is the cell (ahead, left). A robot's
-//! own cell, always occupied, leaves its place to the action value: with it, a window is the whole
-//! input of a network.
+//! ever converted to sensor order. Bit `5·(left + 1) + ahead + 2` is the cell (ahead, left). The
+//! bit of a robot's own cell, which is always occupied, holds the action value instead, so that a
+//! window is the whole input of a network.
 
 use minimal_surprise_controller::sensor::{Cell, SensorModel};
 use minimal_surprise_controller::{Action, SensorBits};
@@ -15,7 +15,7 @@ pub(super) const WINDOW_BITS: usize = 15;
 pub(super) const WINDOWS: usize = 1 << WINDOW_BITS;
 /// Cells of one row.
 pub(super) const ROW_BITS: usize = 5;
-/// The place of the own cell, and of the action value.
+/// The bit of the robot's own cell, used for the action value.
 pub(super) const ACTION_BIT: u16 = 1 << 7;
 /// The cell straight ahead.
 pub(super) const AHEAD_BIT: u16 = 1 << 8;
@@ -51,13 +51,13 @@ impl WindowOrder {
         self.model
     }
 
-    /// A reading in window order, the action's place empty.
+    /// A reading in window order, with the action bit zero.
     pub(super) fn window(&self, reading: u16) -> u16 {
         let [low, high] = &self.from_sensors;
         low[usize::from(reading & 0xff)] | high[usize::from(reading >> 8)]
     }
 
-    /// A one for every sensor.
+    /// A mask with one bit set for every sensor.
     pub(super) fn sensors(&self) -> u16 {
         self.window(self.model.mask().bits())
     }
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn readings_survive_the_way_into_window_order_and_back() {
+    fn readings_survive_the_conversion_to_window_order_and_back() {
         for model in SensorModel::ALL {
             let order = WindowOrder::new(model);
             for bits in 0..=model.mask().bits() {

@@ -5,15 +5,15 @@
 //! Grid: <Lx>, <Ly>
 //! Fitness: <fitness>
 //! <x>, <y>, <start x>, <start y>, <heading x>, <heading y>, <start heading x>, <start heading y>, <type>
-//! ⋮                                            a line a robot, then a blank line
+//! ⋮                                            one line per robot, then a blank line
 //! ```
 //!
-//! The type of a robot is read over.
+//! The type of a robot is ignored.
 
 use super::{ExchangeError, Lines, Problem, grid_header, header, no_overlap, numbers, pose};
 use crate::torus::{Grid, Pose};
 
-/// The run that gave the best genome of a generation its fitness.
+/// The run that determined the fitness of the best genome of a generation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AgentsOfGeneration {
     /// The generation.

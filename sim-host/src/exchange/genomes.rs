@@ -1,22 +1,22 @@
 //! `action_genomes` and `prediction_genomes`: weights of the best genome of each generation.
 //!
-//! Three rows of decimal numbers a generation, for the input, hidden and output neurons of one
+//! Three rows of decimal numbers per generation, for the input, hidden and output neurons of one
 //! network in genome order (see [`minimal_surprise_controller::network`]), then a blank line. All
-//! rows are filled up with random numbers to the length of the longest row of the model's
-//! prediction network, its hidden weights: 80 for sensor model A, 48 for B, 224 for C, and 192 for
-//! C with the line partly predefined.
+//! rows are padded with random numbers to the length of the longest row of the model's prediction
+//! network, that of its hidden weights: 80 for sensor model A, 48 for B, 224 for C, and 192 for C
+//! with the line partly predefined.
 
 use super::{ExchangeError, Lines, Problem, number};
 use minimal_surprise_controller::fixed::{FRACTION_BITS, WEIGHT_MAX_Q3_12};
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{Genome, Prediction, Topology};
 
-/// Rows of one generation's network, as they stand in the file.
+/// Rows of one generation's network, as in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GenomeRows {
     /// Line of the first row, from 1; the others follow.
     pub line: usize,
-    /// The rows of the input, hidden and output neurons, with what they are filled up with.
+    /// The rows of the input, hidden and output neurons, including the padding.
     pub rows: [Vec<f64>; 3],
 }
 
@@ -32,7 +32,7 @@ pub fn read_genomes(text: &str) -> Result<Vec<GenomeRows>, ExchangeError> {
 }
 
 /// The generations of an `action_genomes` or a `prediction_genomes` file, at least one: their rows
-/// as text, so that only the numbers that are needed have to be right. Ends after an error.
+/// as text, so that only the numbers that are used must be valid. The iterator ends after an error.
 pub fn generations(text: &str) -> impl Iterator<Item = Result<RowsOfText<'_>, ExchangeError>> {
     let (mut lines, mut generation, mut ended) = (Lines::of(text), 0, false);
     core::iter::from_fn(move || {
@@ -46,7 +46,7 @@ pub fn generations(text: &str) -> impl Iterator<Item = Result<RowsOfText<'_>, Ex
     })
 }
 
-/// Three rows, and the blank lines after them.
+/// Reads three rows and the blank lines after them.
 fn next_rows<'a>(
     lines: &mut Lines<'a>,
     generation: usize,
@@ -70,7 +70,7 @@ fn next_rows<'a>(
     Ok(RowsOfText { line, rows })
 }
 
-/// The rows of one generation's network, not read yet.
+/// The rows of one generation's network, not parsed yet.
 #[derive(Clone, Copy, Debug)]
 pub struct RowsOfText<'a> {
     line: usize,
@@ -78,7 +78,7 @@ pub struct RowsOfText<'a> {
 }
 
 impl RowsOfText<'_> {
-    /// The numbers in the rows.
+    /// Parses the numbers in the rows.
     ///
     /// # Errors
     /// [`ExchangeError`] names the first line that is wrong.
@@ -117,24 +117,24 @@ impl core::fmt::Display for NetworkName {
     }
 }
 
-/// A weight beyond ±32767/4096 ≈ ±7.9998, which was taken to that limit.
+/// A weight beyond ±32767/4096 ≈ ±7.9998, which was limited to that range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SaturatedWeight {
     /// The network whose file it is in.
     pub network: NetworkName,
     /// Its line, from 1.
     pub line: usize,
-    /// Its place in the line, from 1.
+    /// Its position in the line, from 1.
     pub column: usize,
     /// Its index in the genome.
     pub index: usize,
-    /// What stands in the file.
+    /// The value in the file.
     pub value: f64,
-    /// What was taken instead, Q3.12.
+    /// The weight used instead, Q3.12.
     pub weight_q3_12: i16,
 }
 
-/// A genome from text, and what was lost on the way.
+/// A genome from text, and what was lost in the conversion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportedGenome {
     /// The genome; each weight is the nearest Q3.12 value, ties away from zero.
@@ -145,10 +145,11 @@ pub struct ImportedGenome {
     pub saturated: Vec<SaturatedWeight>,
 }
 
-/// These rows are not the genome asked for.
+/// The rows do not form a genome of the topology.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImportError {
-    /// A row belongs to other networks.
+    /// A row has a length that the topology's networks do not have.
     #[error(
         "{network} genomes, line {line}: a row of {found} numbers; this topology's rows have {}",
         listed(expected)
@@ -173,12 +174,12 @@ fn listed(lengths: &[usize]) -> String {
     lengths.join(" or ")
 }
 
-/// Makes a genome of the rows of one generation. Rows for the prediction network are not looked at
-/// where all predictions are predefined, since there is none then.
+/// Makes a genome from the rows of one generation. If all predictions are predefined there is no
+/// prediction network, and its rows are ignored.
 ///
 /// # Errors
-/// [`ImportError`] if rows are not as long as the topology's, or those of the prediction network
-/// are missing.
+/// [`ImportError`] if the length of a row does not match the topology, or the rows of the
+/// prediction network are missing.
 pub fn import_genome(
     topology: Topology,
     action: &GenomeRows,
@@ -235,8 +236,8 @@ pub fn import_genome(
     })
 }
 
-/// Lengths that rows may have: hidden weights of the topology's prediction network, or, if it has
-/// none, of any of its sensor model's.
+/// Lengths that rows may have: the number of hidden weights of the topology's prediction network,
+/// or, if it has none, of any prediction network of its sensor model.
 fn row_lengths(topology: Topology) -> Vec<usize> {
     let hidden = |shape: Shape| shape.hidden() * shape.hidden_row();
     let same = |other: &Topology| match topology.prediction() {
@@ -266,7 +267,7 @@ mod tests {
     use super::*;
     use minimal_surprise_controller::{SensorModel, Template};
 
-    /// A generation whose rows count up in units of 1/4096, filled up to a length.
+    /// A generation whose rows count up in units of 1/4096, padded to a length.
     fn text(length: usize) -> String {
         let row = |start: usize| -> String {
             let row = start..start + length;
@@ -345,7 +346,7 @@ mod tests {
         rows.rows[0][3] = 0.1; // 409.6 units: 410, 0.4/4096 off.
         rows.rows[1][5] = -8.0;
         rows.rows[2][7] = 7.9998; // 32767.18 units.
-        rows.rows[2][40] = 100.0; // Fills up.
+        rows.rows[2][40] = 100.0; // Padding.
         let model_b = topology(SensorModel::B, Prediction::Predefined(Template::Pair));
         let imported = import_genome(model_b, &rows, None).unwrap();
         assert!((imported.rounding_error_max - 0.4 / 4096.0).abs() < 1e-12);
@@ -374,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn a_generation_needs_no_other_to_be_right() {
+    fn a_generation_can_be_read_although_others_are_invalid() {
         let of = |text| -> Vec<_> { generations(text).collect() };
         let rows = of("x\n2\n3\n\n4\n5\n6\n\n7\n8\n");
         assert!(rows[0].as_ref().unwrap().numbers().is_err());

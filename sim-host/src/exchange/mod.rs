@@ -1,5 +1,5 @@
-//! The text files of the program that the paper's authors published, so that their data can be
-//! read here and their analysis scripts run on ours.
+//! The text files of the program published by the paper's authors. Their data can be read here, and
+//! their analysis scripts can read ours.
 //!
 //! | file | module |
 //! |---|---|
@@ -7,9 +7,9 @@
 //! | `agents` | [`agents`]: starting and final poses of the best genome of each generation, read |
 //! | `action_genomes`, `prediction_genomes` | [`genomes`]: weights of the best genome of each generation, read |
 //!
-//! Numbers are separated by commas and spaces. A heading is the step ahead: `1, 0` is east, `0, 1`
-//! north, `-1, 0` west, `0, -1` south. Blank lines at the end and spaces around lines are allowed;
-//! anything else that is not as described is refused with the number of its line.
+//! Numbers are separated by commas and spaces. A heading is given as the step ahead: `1, 0` is
+//! east, `0, 1` north, `-1, 0` west, `0, -1` south. Blank lines at the end and spaces around lines
+//! are allowed; any other deviation is refused with its line number.
 
 pub mod agents;
 pub mod genomes;
@@ -26,7 +26,7 @@ use crate::torus::{Grid, GridError, Heading, Pose};
 use crate::world::{WorldError, check_poses};
 use core::str::FromStr;
 
-/// What is wrong with a text, and where.
+/// An error in a text, and its line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("line {line}: {problem}")]
 pub struct ExchangeError {
@@ -36,10 +36,11 @@ pub struct ExchangeError {
     pub problem: Problem,
 }
 
-/// What may be wrong with a line.
+/// An error in a line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Problem {
-    /// Another line was expected.
+    /// A different line was expected.
     #[error("expected `{expected}`, found {found:?}")]
     Expected {
         /// Form of the line.
@@ -56,13 +57,13 @@ pub enum Problem {
     /// Something is not a number.
     #[error("{found:?} is not a finite number")]
     NotANumber {
-        /// What stands there.
+        /// The text found.
         found: String,
     },
-    /// No such grid can be built.
+    /// The grid is not valid.
     #[error(transparent)]
     Grid(#[from] GridError),
-    /// No robot, or more than cells.
+    /// There is no robot, or there are more robots than cells.
     #[error("{robots} robots on a {grid} grid; from 1 to {} fit", grid.cells())]
     RobotsDoNotFit {
         /// Number of robots.
@@ -75,10 +76,10 @@ pub enum Problem {
     OtherSwarmSize {
         /// Robots of the generation that ends here.
         found: usize,
-        /// Robots of those before.
+        /// Robots of the generations before.
         expected: usize,
     },
-    /// A line of another time step.
+    /// The line belongs to a different time step.
     #[error("a robot of t = {found} where t = {expected} is expected")]
     OtherStep {
         /// The time step expected.
@@ -146,7 +147,7 @@ impl<'a> Lines<'a> {
         Some((index + 1, text.trim()))
     }
 
-    /// The next line, which has to be there.
+    /// The next line, which must exist.
     fn required(
         &mut self,
         missing: impl FnOnce() -> String,
@@ -225,7 +226,7 @@ fn unexpected(expected: &'static str, found: &str) -> Problem {
     }
 }
 
-/// The beginning of a text, for a message of one line.
+/// The start of a text, for a one-line message.
 fn shortened(text: &str) -> String {
     text.chars().take(40).collect()
 }

@@ -1,21 +1,21 @@
-//! `agent_trajectory`: a run, one line a robot and step.
+//! `agent_trajectory`: a run, one line per robot and step.
 //!
 //! ```text
 //! Gen: <generation>
 //! Grid: <Lx>, <Ly>
 //! Agents: <N>
-//! <t>: <x>, <y>, <heading x>, <heading y>      N lines a step, t = 0, 1, …
+//! <t>: <x>, <y>, <heading x>, <heading y>      N lines per step, t = 0, 1, …
 //! ```
 //!
-//! The number of steps is not in the file, so that a text that ends between two steps cannot be
-//! told from a shorter run.
+//! The file does not contain the number of steps, so a text that ends between two steps looks like
+//! a shorter run.
 
 use super::{ExchangeError, Lines, Problem, grid_header, header, no_overlap, numbers, pose};
 use crate::torus::{Grid, Pose};
 use crate::trace::Trace;
 use std::io;
 
-/// A run as poses only.
+/// The poses of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trajectory {
     generation: u32,
@@ -61,7 +61,7 @@ impl Trajectory {
         self.states.last().map_or(&[], Vec::as_slice)
     }
 
-    /// Number of steps: one less than there are states.
+    /// Number of steps: one less than the number of states.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.states.len().saturating_sub(1) as u32
@@ -96,7 +96,7 @@ impl Trajectory {
     /// Writes the text of an `agent_trajectory`.
     ///
     /// # Errors
-    /// Whatever the writer returns.
+    /// Any error of the writer.
     pub fn write(&self, out: &mut impl io::Write) -> io::Result<()> {
         writeln!(out, "Gen: {}", self.generation)?;
         writeln!(out, "Grid: {}, {}", self.grid.width(), self.grid.height())?;
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trajectory_is_read_and_written_as_it_was() {
+    fn a_trajectory_is_read_and_written_unchanged() {
         let trajectory = Trajectory::read(TEXT).unwrap();
         assert_eq!(trajectory.generation(), 3);
         assert_eq!(trajectory.steps(), 1);

@@ -1,9 +1,9 @@
 //! Clusters: robots packed so closely that they block each other.
 //!
 //! A core is a robot with at least [`MOORE_MIN`] robots in its Moore neighbourhood, at least
-//! [`VON_NEUMANN_MIN`] of them orthogonally next to it. A cluster is a Moore-connected set of
-//! cores with all their neighbours. Two clusters connect when a robot of one is orthogonally next
-//! to a robot of the other, or in both; clusters connected to a third are connected (paper,
+//! [`VON_NEUMANN_MIN`] of them orthogonally next to it. A cluster is a Moore-connected set of cores
+//! with all their neighbours. Two clusters are connected if a robot of one is orthogonally next to
+//! a robot of the other, or belongs to both; clusters connected to a third are connected (paper,
 //! Sec. 2.2).
 
 use super::field::{Field, MOORE, VON_NEUMANN};
@@ -13,7 +13,7 @@ pub const MOORE_MIN: usize = 6;
 /// Fewest orthogonal neighbours of a core.
 pub const VON_NEUMANN_MIN: usize = 3;
 
-/// The grouping behaviour that a swarm's clusters amount to.
+/// The grouping behaviour that a swarm's clusters form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Grouping {
     /// One cluster.
@@ -39,8 +39,8 @@ impl Clusters {
         &self.clusters
     }
 
-    /// For each cluster, the number of its group: connected clusters have the same. It is the
-    /// index of the group's first cluster.
+    /// For each cluster, the number of its group, which is the index of the group's first cluster.
+    /// Connected clusters are in the same group.
     #[must_use]
     pub fn groups(&self) -> &[u32] {
         &self.groups
@@ -52,7 +52,7 @@ impl Clusters {
         &self.robots
     }
 
-    /// Pairs of connected clusters, directly or by way of others.
+    /// Number of pairs of clusters connected directly or through others.
     #[must_use]
     pub fn connections(&self) -> u64 {
         let mut sizes = vec![0_u64; self.clusters.len()];
@@ -64,7 +64,7 @@ impl Clusters {
         connections
     }
 
-    /// What the clusters amount to; `None` without clusters.
+    /// The grouping that the clusters form; `None` without clusters.
     #[must_use]
     pub fn grouping(&self) -> Option<Grouping> {
         let first = self.groups.first()?;
@@ -81,12 +81,12 @@ impl Clusters {
 /// Mark of a robot in no cluster.
 const NONE: u32 = u32::MAX;
 
-/// All clusters, in the order of their southernmost, then westernmost, core.
+/// All clusters, ordered by their southernmost, then westernmost, core.
 pub(super) fn find(field: &Field) -> Clusters {
     let core = cores(field);
     let mut clusters: Vec<Vec<u32>> = Vec::new();
     let mut reached = vec![false; field.robots()];
-    // Of several clusters, a robot remembers the first and the last that it was found in.
+    // The first and the last cluster that each robot was found in.
     let mut first_cluster = vec![NONE; field.robots()];
     let mut last_cluster = vec![NONE; field.robots()];
     let mut groups = Groups::default();
@@ -140,7 +140,7 @@ pub(super) fn find(field: &Field) -> Clusters {
     }
 }
 
-/// For every robot, whether it is a core.
+/// Whether each robot is a core.
 fn cores(field: &Field) -> Vec<bool> {
     let mut core = vec![false; field.robots()];
     for robot in field.row_by_row() {
@@ -153,14 +153,14 @@ fn cores(field: &Field) -> Vec<bool> {
     core
 }
 
-/// Clusters that are connected, each group known by its first cluster.
+/// Groups of connected clusters (union-find), each represented by its first cluster.
 #[derive(Default)]
 struct Groups {
     parent: Vec<u32>,
 }
 
 impl Groups {
-    /// A new cluster, connected to none.
+    /// Adds a cluster that is connected to no other.
     fn add(&mut self) -> u32 {
         let number = self.parent.len() as u32;
         self.parent.push(number);

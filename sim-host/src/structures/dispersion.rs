@@ -1,12 +1,12 @@
 //! Dispersion: squares, triangular lattices, and robots that stand apart by chance.
 //!
-//! Headings do not matter. Patterns are read on the torus: on a grid that is shorter than a
-//! pattern some of its cells are the same, and it is there if each is as the pattern asks for all
-//! its places. On a side of three cells no pattern can be.
+//! Headings do not matter. Patterns are matched on the torus: on a grid smaller than a pattern,
+//! several positions of the pattern are the same cell, which must then satisfy all of them. On a
+//! side of three cells no pattern is possible.
 
 use super::field::{Field, MOORE};
 
-/// Corners of a square, from its south-western robot.
+/// Corners of a square, relative to its south-western robot.
 const CORNERS: [(i32, i32); 4] = [(0, 0), (2, 0), (0, 2), (2, 2)];
 
 /// Occupied cells around the centre of a triangular lattice.
@@ -37,8 +37,8 @@ const LATTICE_EMPTY: [(i32, i32); 12] = [
     (-2, -1),
 ];
 
-/// For every robot, whether it is in a square: the corners of a 3 × 3 block are occupied, the
-/// other 21 cells of the 5 × 5 block around it are empty.
+/// Whether each robot is in a square: the corners of a 3 × 3 block are occupied, the other 21 cells
+/// of the 5 × 5 block around it are empty.
 pub(super) fn in_squares(field: &Field) -> Vec<bool> {
     let mut members = vec![false; field.robots()];
     for robot in field.row_by_row() {
@@ -53,7 +53,7 @@ pub(super) fn in_squares(field: &Field) -> Vec<bool> {
     members
 }
 
-/// For every robot, whether it is in a triangular lattice: a centre or one of the eight around it.
+/// Whether each robot is in a triangular lattice: a centre or one of the eight around it.
 pub(super) fn in_triangular_lattices(field: &Field) -> Vec<bool> {
     let mut members = vec![false; field.robots()];
     for robot in field.row_by_row() {
@@ -66,7 +66,7 @@ pub(super) fn in_triangular_lattices(field: &Field) -> Vec<bool> {
     members
 }
 
-/// For every robot, whether it has at most one Moore neighbour and is not `excluded`.
+/// Whether each robot has at most one Moore neighbour and is not `excluded`.
 pub(super) fn randomly_dispersed(field: &Field, excluded: impl Fn(u32) -> bool) -> Vec<bool> {
     let mut members = vec![false; field.robots()];
     for robot in field.row_by_row() {

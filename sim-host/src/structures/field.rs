@@ -1,4 +1,4 @@
-//! The swarm as cells: which robot stands where.
+//! The swarm as cells: the robot on each cell.
 
 use crate::torus::{Grid, Heading, Pose};
 use crate::world::{WorldError, check_poses};
@@ -6,7 +6,7 @@ use crate::world::{WorldError, check_poses};
 /// Mark of a cell without a robot.
 const EMPTY: u32 = u32::MAX;
 
-/// A swarm that can be asked what is near a robot.
+/// A swarm that can be queried for the neighbours of a robot.
 pub(super) struct Field<'a> {
     grid: Grid,
     poses: &'a [Pose],
@@ -28,8 +28,8 @@ impl<'a> Field<'a> {
         self.poses.len()
     }
 
-    /// All robots, row by row from the south, each from the west: an order that depends on where
-    /// the robots are only, and that meets neighbours soon after each other.
+    /// All robots, row by row from the south, each from the west: an order that depends only on
+    /// where the robots are, and that visits neighbours close together.
     pub(super) fn row_by_row(&self) -> impl Iterator<Item = u32> {
         self.cells.iter().copied().filter(|&robot| robot != EMPTY)
     }
@@ -38,8 +38,8 @@ impl<'a> Field<'a> {
         self.poses[robot as usize].heading
     }
 
-    /// Robot on the cell (dx, dy) from a robot, across the edges; at most three cells away, which
-    /// the shortest side is.
+    /// Robot on the cell (dx, dy) from a robot, across the edges; at most three cells away, the
+    /// length of the shortest side.
     pub(super) fn near(&self, robot: u32, (dx, dy): (i32, i32)) -> Option<u32> {
         let Pose { x, y, .. } = self.poses[robot as usize];
         let x = wrapped(i32::from(x) + dx, self.grid.width());
@@ -54,7 +54,7 @@ impl<'a> Field<'a> {
     }
 }
 
-/// A coordinate that is at most one side off, on the torus.
+/// Wraps a coordinate that is off the grid by at most one side.
 fn wrapped(at: i32, side: u16) -> u16 {
     let side = i32::from(side);
     let on_torus = if at < 0 {

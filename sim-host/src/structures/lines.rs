@@ -1,12 +1,12 @@
 //! Lines: robots in a row that hold each other in place.
 //!
 //! Along an axis, take a maximal run of neighbouring robots whose headings lie on that axis, and
-//! drop the robots that point outward from both of its ends. What is left is a line if it has at
-//! least [`LENGTH_MIN`] robots and no two adjacent cells beside it, on the same side, are both
-//! occupied. A run around the whole torus needs no ends (paper, Sec. 2.2, rules 1 to 3).
+//! drop the robots that point outward from both of its ends. The rest is a line if it has at least
+//! [`LENGTH_MIN`] robots and no two adjacent cells beside it, on the same side, are both occupied.
+//! A run around the whole torus needs no ends (paper, Sec. 2.2, rules 1 to 3).
 //!
-//! The paper also asks for at most half the length of neighbours on a side. Of n cells in a row
-//! no two of which are adjacent there are at most ⌈n/2⌉, so that this holds by itself.
+//! The paper also requires the number of neighbours on a side to be at most half the length. At
+//! most ⌈n/2⌉ of n cells in a row are non-adjacent, so this always holds.
 
 use super::field::Field;
 use crate::torus::Heading;
@@ -27,7 +27,7 @@ impl Axis {
     /// Every axis, in order.
     pub const ALL: [Self; 2] = [Self::Horizontal, Self::Vertical];
 
-    /// The heading along the axis; the other on it is its reverse.
+    /// The heading along the axis; the other heading on the axis is its reverse.
     fn forward(self) -> Heading {
         match self {
             Self::Horizontal => Heading::East,
@@ -50,7 +50,7 @@ impl Axis {
 /// One line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Line {
-    /// Direction that it runs in.
+    /// Direction of the line.
     pub axis: Axis,
     /// Its robots, in order along the axis.
     pub robots: Vec<u32>,
@@ -58,7 +58,7 @@ pub struct Line {
     pub spanning: bool,
 }
 
-/// How many lines there are, and which way they run.
+/// Numbers of lines by direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineCounts {
     /// Lines from west to east.
@@ -69,7 +69,7 @@ pub struct LineCounts {
     pub spanning: u32,
 }
 
-/// Which way most lines of a swarm run (paper, Sec. 3.3.2).
+/// The direction of most lines of a swarm (paper, Sec. 3.3.2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LineOrientation {
     /// More than two thirds of the lines are horizontal.
@@ -94,8 +94,8 @@ impl LineOrientation {
         }
     }
 
-    /// What a genome forms from many starts: the orientation of more than half of the runs, or
-    /// `None` if there is no such (the paper's *diverse*). Runs without lines count as runs.
+    /// The orientation that a genome forms from many starts: that of more than half of the runs, or
+    /// `None` if there is none (the paper's *diverse*). Runs without lines count as runs.
     #[must_use]
     pub fn of_most(runs: &[Option<Self>]) -> Option<Self> {
         Self::ALL.into_iter().find(|&orientation| {
@@ -118,13 +118,13 @@ impl LineCounts {
         counts
     }
 
-    /// Lines of either direction.
+    /// Number of lines of either direction.
     #[must_use]
     pub fn total(self) -> u32 {
         self.horizontal + self.vertical
     }
 
-    /// Which way most of them run; `None` without lines.
+    /// The direction of most lines; `None` without lines.
     #[must_use]
     pub fn orientation(self) -> Option<LineOrientation> {
         if self.total() == 0 {
@@ -170,7 +170,7 @@ pub(super) fn find(field: &Field) -> Vec<Line> {
                 add(&run, false);
             }
         }
-        // A run that no robot is the first of goes around the torus.
+        // A run without a first robot goes around the torus.
         for first in field.row_by_row().filter(on_axis) {
             if !seen[first as usize] {
                 follow(field, axis, first, &mut seen, &mut run);
@@ -205,7 +205,7 @@ fn without_outward<'a>(field: &Field, axis: Axis, run: &'a [u32]) -> &'a [u32] {
     }
 }
 
-/// Whether on neither side two adjacent cells beside the line are occupied.
+/// Whether no two adjacent cells on the same side of the line are occupied.
 fn sides_are_free(field: &Field, axis: Axis, line: &[u32], ring: bool) -> bool {
     let (dx, dy) = axis.forward().ahead();
     [(dy, dx), (-dy, -dx)].into_iter().all(|side| {

@@ -1,7 +1,7 @@
-//! Structures: what a swarm has assembled into (paper, Sec. 2.2), on any torus, for any number of
+//! Structures that a swarm has assembled into (paper, Sec. 2.2), on any torus, for any number of
 //! robots, in time linear in cells and robots.
 //!
-//! A robot may belong to several structures. A run is named after the structure that holds most
+//! A robot may belong to several structures. A run is named after the structure with the most
 //! robots.
 
 mod clusters;
@@ -10,7 +10,7 @@ mod field;
 mod lines;
 mod pairs;
 
-/// Names in words: `lines`, `lines and pairs (tied)`, `nothing`.
+/// The names as text: `line`, `line and pair (tied)`, `nothing`.
 #[must_use]
 pub fn in_words(names: &[Structure]) -> String {
     let words: Vec<&str> = names.iter().map(|structure| structure.name()).collect();
@@ -45,9 +45,9 @@ pub enum Structure {
     Clustering,
     /// Several clusters, all connected.
     LooseGrouping,
-    /// Robots with at most one neighbour.
+    /// Robots with at most one neighbour that are in no line, pair or square.
     RandomDispersion,
-    /// Robots on the corners of 3 × 3 blocks, nothing else around.
+    /// Robots on the corners of 3 × 3 blocks, with all other cells around them empty.
     Square,
     /// Robots on every second cell, alternate rows shifted by one.
     TriangularLattice,
@@ -111,8 +111,8 @@ impl Membership {
 }
 
 impl Structure {
-    /// What similarity to an earlier state goes by: triangular lattices are compared by cells,
-    /// since their robots keep turning, everything else by poses (paper, Sec. 3.4).
+    /// How the similarity to an earlier state is measured: triangular lattices are compared by
+    /// cells, because their robots keep turning, all others by poses (paper, Sec. 3.4).
     #[must_use]
     pub fn matching(self) -> Match {
         match self {
@@ -138,15 +138,15 @@ impl core::fmt::Display for Structure {
     }
 }
 
-/// A pattern that robots may stand in: one of the paper's, or one of your own.
+/// A pattern of robots: one of the paper's structures, or your own.
 pub trait Pattern {
-    /// Whether each robot belongs to it, robot 0 first.
+    /// Whether each robot belongs to the pattern, robot 0 first.
     ///
     /// # Errors
     /// [`WorldError`] if a robot is outside the grid or two share a cell.
     fn members(&self, grid: Grid, poses: &[Pose]) -> Result<Vec<bool>, WorldError>;
 
-    /// Share of the robots that belong to it, 0 to 1; 0 without robots.
+    /// Share of the robots that belong to the pattern, 0 to 1; 0 without robots.
     ///
     /// # Errors
     /// [`WorldError`] if a robot is outside the grid or two share a cell.
@@ -165,7 +165,7 @@ impl Pattern for Structure {
     }
 }
 
-/// What a swarm has assembled into, and which robots belong to it.
+/// The structures of a swarm, and the robots that belong to each.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Structures {
     swarm_size: u32,
@@ -180,7 +180,24 @@ pub struct Structures {
     in_lattice: Vec<bool>,
 }
 
-/// Finds every structure of a swarm.
+/// Finds all structures of a swarm.
+///
+/// ```
+/// use minimal_surprise_sim::{Structure, classify, drawing};
+///
+/// let (grid, poses) = drawing::parse(
+///     "······
+///      ·▶▶◀··
+///      ······
+///      ▼·····
+///      ▲·····",
+/// )?;
+/// let structures = classify(grid, &poses)?;
+/// assert_eq!(structures.count(Structure::Line), 3);
+/// assert_eq!(structures.count(Structure::Pair), 2);
+/// assert_eq!(structures.names(), [Structure::Line]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`WorldError`] if a robot is outside the grid or two share a cell.
@@ -225,7 +242,7 @@ impl Structures {
             .is_some_and(|members| members.get(robot as usize) == Some(&true))
     }
 
-    /// The structures that every robot belongs to, robot 0 first.
+    /// The structures that each robot belongs to, robot 0 first.
     #[must_use]
     pub fn memberships(&self) -> Vec<Membership> {
         let mut memberships = vec![Membership::default(); self.swarm_size as usize];
@@ -268,7 +285,7 @@ impl Structures {
         &self.lines
     }
 
-    /// How many lines there are, and which way they run.
+    /// Numbers of lines by direction.
     #[must_use]
     pub fn line_counts(&self) -> LineCounts {
         LineCounts::of(&self.lines)
@@ -280,15 +297,15 @@ impl Structures {
         &self.pairs
     }
 
-    /// The clusters. Their robots count for the one of aggregation, clustering and loose grouping
-    /// that the clusters amount to.
+    /// The clusters. Together they are an aggregation, a clustering or a loose grouping, and their
+    /// robots count for that structure.
     #[must_use]
     pub fn clusters(&self) -> &Clusters {
         &self.clusters
     }
 
-    /// What the run is named after: the structures that hold most robots, usually one. If there
-    /// are k of them the run counts 1/k for each; none if no robot is in any structure.
+    /// The structures that the run is named after: those with the most robots, usually one. If
+    /// there are k of them, the run counts 1/k for each; none if no robot is in any structure.
     #[must_use]
     pub fn names(&self) -> Vec<Structure> {
         let counts = Structure::ALL.map(|structure| (structure, self.count(structure)));

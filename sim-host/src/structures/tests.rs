@@ -1,4 +1,4 @@
-//! Drawn swarms. North is at the top; the edges are joined.
+//! Drawn swarms. North is at the top; opposite edges are joined.
 
 use super::*;
 use crate::drawing::{EMPTY, draw, parse};
@@ -11,7 +11,7 @@ fn classified(drawing: &str) -> Structures {
     classify(grid, &poses).unwrap()
 }
 
-/// The drawing with the members of a structure only.
+/// The drawing with only the members of a structure.
 fn members(structure: Structure, drawing: &str) -> String {
     let (grid, poses) = parse(drawing).unwrap();
     let structures = classify(grid, &poses).unwrap();
@@ -79,7 +79,7 @@ fn outward_robots_are_dropped_from_both_ends_of_a_line() {
 }
 
 #[test]
-fn fewer_than_three_robots_after_dropping_are_no_line() {
+fn fewer_than_three_robots_after_dropping_are_not_a_line() {
     let drawing = "
         ·······
         ·◀▶◀▶··
@@ -116,7 +116,7 @@ fn a_robot_across_the_axis_ends_a_run() {
 }
 
 #[test]
-fn a_line_across_the_edge_is_whole() {
+fn a_line_across_the_edge_is_one_line() {
     let drawing = "
         ······
         ▶◀···▶
@@ -134,7 +134,7 @@ fn a_line_across_the_edge_is_whole() {
 }
 
 #[test]
-fn a_line_across_the_edge_stays_whole_when_outward_robots_are_dropped() {
+fn a_line_across_the_edge_stays_one_line_when_outward_robots_are_dropped() {
     assert_members(
         Structure::Line,
         "·······
@@ -161,7 +161,7 @@ fn a_ring_around_the_torus_is_a_line_whatever_its_headings() {
 }
 
 #[test]
-fn a_row_that_one_robot_keeps_from_being_a_ring_needs_ends() {
+fn a_row_that_is_almost_a_ring_needs_ends() {
     assert_no_members(
         Structure::Line,
         "·····
@@ -189,7 +189,7 @@ fn lines_that_touch_end_to_end_are_one_line() {
 }
 
 #[test]
-fn lines_that_touch_side_by_side_are_no_lines() {
+fn lines_that_touch_side_by_side_are_not_lines() {
     assert_no_members(
         Structure::Line,
         "·····
@@ -328,7 +328,7 @@ fn on_a_side_of_three_cells_robots_facing_across_the_edge_are_a_pair() {
 }
 
 #[test]
-fn pairs_that_touch_side_by_side_are_no_pairs() {
+fn pairs_that_touch_side_by_side_are_not_pairs() {
     assert_no_members(
         Structure::Pair,
         "·▶◀·
@@ -393,7 +393,7 @@ fn neighbours_beside_a_pair_are_adjacent_across_the_edge() {
 }
 
 #[test]
-fn a_pair_may_lie_in_a_run_that_failed_as_a_line() {
+fn a_pair_may_be_part_of_a_run_that_is_not_a_line() {
     assert_members(
         Structure::Pair,
         "·▲▲···
@@ -421,7 +421,7 @@ fn a_full_block_of_nine_is_one_cluster() {
 }
 
 #[test]
-fn a_cluster_across_the_corner_of_the_torus_is_one() {
+fn a_cluster_across_the_corner_of_the_torus_is_one_cluster() {
     assert_all_are_members(
         Structure::Aggregation,
         "▲▲··▲
@@ -692,7 +692,7 @@ fn on_a_side_of_three_cells_there_is_no_square_and_no_triangular_lattice() {
 }
 
 #[test]
-fn a_run_is_named_after_the_structure_that_holds_most_robots() {
+fn a_run_is_named_after_the_structure_with_the_most_robots() {
     let structures = classified(
         "·········
          ·▶▶◀·····
@@ -710,7 +710,7 @@ fn a_run_is_named_after_the_structure_that_holds_most_robots() {
 }
 
 #[test]
-fn structures_that_hold_equally_many_robots_share_the_name() {
+fn structures_with_equally_many_robots_share_the_name() {
     let structures = classified("······\n·▶◀···\n······\n▲··▲··\n······");
     let shared = [Structure::Pair, Structure::RandomDispersion];
     assert_eq!(structures.names(), shared);
@@ -742,7 +742,7 @@ fn mostly_is_more_than_two_thirds_of_the_lines() {
 }
 
 #[test]
-fn a_genome_forms_what_more_than_half_of_its_runs_form() {
+fn a_genome_forms_the_orientation_of_more_than_half_of_its_runs() {
     use LineOrientation::{MazeLike, MostlyVertical};
     let runs = |vertical: usize| {
         let mut runs = vec![Some(MostlyVertical); vertical];
@@ -758,7 +758,7 @@ fn a_genome_forms_what_more_than_half_of_its_runs_form() {
 }
 
 #[test]
-fn poses_that_cannot_be_are_refused() {
+fn impossible_poses_are_refused() {
     let grid = Grid::new(4, 4).unwrap();
     let pose = |x, y| Pose {
         x,
@@ -775,7 +775,8 @@ fn poses_that_cannot_be_are_refused() {
     ));
 }
 
-/// What does not depend on where on the torus a swarm is, how it is turned or how it is numbered.
+/// The properties of a swarm that do not depend on its position on the torus, its rotation or its
+/// numbering.
 fn summary(structures: &Structures) -> Vec<u64> {
     let lines = structures.line_counts();
     let clusters = structures.clusters();
@@ -792,7 +793,7 @@ fn summary(structures: &Structures) -> Vec<u64> {
 }
 
 #[test]
-fn structures_stay_the_same_when_the_swarm_is_shifted_turned_or_renumbered() {
+fn structures_stay_the_same_when_the_swarm_is_shifted_rotated_or_renumbered() {
     let mut seen = [0; 8];
     for (index, (width, height, robots)) in [
         (3, 3, 4),
@@ -839,13 +840,13 @@ fn structures_stay_the_same_when_the_swarm_is_shifted_turned_or_renumbered() {
         let renumbered: Vec<Pose> = poses.iter().rev().copied().collect();
         check(grid, &renumbered);
     }
-    // Lattices are too rare in random swarms to be met.
+    // Lattices are too rare to occur in random swarms.
     println!("members met: {seen:?}");
     assert!(seen[..6].iter().all(|&count| count > 0));
 }
 
 #[test]
-fn memberships_are_those_of_every_structure() {
+fn memberships_agree_with_the_members_of_every_structure() {
     let grid = Grid::new(15, 15).unwrap();
     for start in 0..20 {
         let stream = &mut SeedTree::new(2).stream(Purpose::Starts, 0, start);

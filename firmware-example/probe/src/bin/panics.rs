@@ -1,4 +1,4 @@
-//! One index that nothing checks. Must not link, or the other program's linking means nothing.
+//! An unchecked index. Must not link, otherwise the linking of the other program proves nothing.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! A controller with its activation tables, and what it takes to load its genome from the slots.
+//! A controller with its activation tables, and the code that loads its genome from the slots.
 #![no_std]
 #![no_main]
 

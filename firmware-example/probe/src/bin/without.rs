@@ -1,4 +1,4 @@
-//! What `with` has around the controller, and no controller.
+//! The program `with` without its controller.
 #![no_std]
 #![no_main]
 

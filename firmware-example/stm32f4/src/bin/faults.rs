@@ -1,6 +1,6 @@
-//! Turns the wheels and provokes the fault that QEMU's command line names. The test `faults` watches
+//! Turns the wheels and provokes the fault named on QEMU's command line. The test `faults` observes
 //! the wheels' registers from outside. Not for a robot: QEMU's chip has neither clock nor timers,
-//! so that this is all of the firmware that it can run.
+//! so it can run no other part of the firmware.
 //!
 //! With `unsafe` code: a register is an address.
 #![no_std]
@@ -16,7 +16,7 @@ use firmware_example::provoke::provoke;
 // Links the chip's interrupts.
 use stm32f4xx_hal as _;
 
-/// Setting pins of port C.
+/// The register that sets pins of port C.
 const GPIOC_BSRR: *mut u32 = 0x4002_0818 as *mut u32;
 /// Both wheels ahead at full speed.
 const AHEAD: u32 = 0x03c0;
@@ -24,7 +24,7 @@ const AHEAD: u32 = 0x03c0;
 #[entry]
 fn main() -> ! {
     guard_stack();
-    // SAFETY: a register of pins that nothing else uses.
+    // SAFETY: a register of pins that no other code uses.
     unsafe { core::ptr::write_volatile(GPIOC_BSRR, AHEAD) };
     provoke()
 }

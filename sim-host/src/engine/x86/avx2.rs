@@ -1,4 +1,4 @@
-//! AVX2: predictions of 16 robots a register of activations, 8 a register of sums.
+//! AVX2: predictions with 16 robots per register of activations and 8 per register of sums.
 
 use super::super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, PAIRS};
 use super::super::network::PredictionWeights;
@@ -6,7 +6,7 @@ use core::arch::x86_64::*;
 use minimal_surprise_controller::activation::{MAGNITUDE_CLAMP, SEGMENT_SCALE, SEGMENTS};
 use minimal_surprise_controller::fixed::FRACTION_BITS;
 
-/// Bits of a window that choose from a table: a permutation has eight entries.
+/// Bits of a window that select from a table: a permutation has eight entries.
 const TABLE_BITS: usize = 3;
 /// Tables of a hidden neuron.
 const TABLES: usize = 5;
@@ -16,7 +16,7 @@ const HALF: usize = 16;
 /// A prediction network laid out for [`run_block`].
 #[repr(align(64))]
 pub(in super::super) struct Network {
-    /// For each hidden neuron, the sums that each value of each three bits of a window gives.
+    /// For each hidden neuron, the sums for each value of each three bits of a window.
     inputs: [[[i32; 8]; TABLES]; 2 * PAIRS],
     /// Self-loop of each hidden neuron, in its half of a pair; zero in the other half.
     self_loops: [i32; 2 * PAIRS],
@@ -119,7 +119,7 @@ fn run_half(
             let bit = _mm256_set1_epi16((1_u16 << bit) as i16);
             expected_empty = _mm256_or_si256(expected_empty, _mm256_and_si256(signs, bit));
         }
-        // Packed signs are in the order of packing; windows are in the robots'.
+        // Packed signs are in packed order; windows are in the robots' order.
         expected_empty = _mm256_permute4x64_epi64::<0b11_01_10_00>(expected_empty);
         if step == 0 {
             let at_start = _mm256_set1_epi16(network.expected_empty_at_start as i16);
@@ -186,7 +186,7 @@ fn mask_of_bits(bits: u32) -> __m256i {
     unsafe { _mm256_loadu_si256(mask.as_ptr().cast()) }
 }
 
-/// Ones of every 16-bit lane.
+/// Number of ones in every 16-bit lane.
 #[target_feature(enable = "avx2")]
 #[inline]
 fn ones(x: __m256i) -> __m256i {
@@ -201,7 +201,7 @@ fn ones(x: __m256i) -> __m256i {
     _mm256_maddubs_epi16(bytes, _mm256_set1_epi8(1))
 }
 
-/// Coefficients by segment, twice: a byte shuffle chooses within 128 bits.
+/// Coefficients by segment, twice, because a byte shuffle selects within 128 bits.
 #[repr(align(64))]
 struct Coefficients([[i16; 16]; 4]);
 
@@ -226,7 +226,7 @@ struct Activation {
     clamp: __m256i,
     scale: __m256i,
     half: __m256i,
-    /// Turns a segment into the numbers of its two bytes, as factor and addend.
+    /// Factor and addend that convert a segment into the indices of its two bytes.
     to_bytes: [__m256i; 2],
 }
 

@@ -1,7 +1,7 @@
-//! x86-64 vector paths. The only unsafe code of the crate is in this folder: the intrinsics that
-//! go through pointers, and calls of functions compiled for instructions that not every processor
-//! has. The latter are methods of [`Avx2`] and [`Avx512`], values of which exist only where the
-//! processor was found to have the instructions.
+//! x86-64 vector paths. The only unsafe code of the crate is in this folder: intrinsics that use
+//! pointers, and calls of functions compiled for instructions that not every processor has. These
+//! calls are in methods of [`Avx2`] and [`Avx512`], whose values exist only if the processor was
+//! found to have the instructions.
 #![allow(unsafe_code)]
 
 pub(super) mod avx2;
@@ -20,12 +20,12 @@ pub struct Avx2(());
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Avx512(());
 
-/// What sensing and deciding need and change.
+/// The inputs and outputs of sensing and deciding.
 pub(super) struct Sensing<'a> {
     pub(super) board: &'a Board,
     pub(super) robots: usize,
     pub(super) words: &'a mut [u32],
-    /// The whole action table, and three bytes more.
+    /// The whole action table, plus three bytes.
     pub(super) entries: &'a [u8],
     /// Window bits that are sensors.
     pub(super) sensors: u16,
@@ -46,7 +46,7 @@ impl Avx2 {
         blocks: &Blocks,
         matches: &mut Matches,
     ) -> u32 {
-        // SAFETY: `self` exists only where AVX2 does.
+        // SAFETY: `self` exists only if the processor has AVX2.
         unsafe { avx2::run_block(network, lanes, blocks, matches) }
     }
 }
@@ -70,24 +70,24 @@ impl Avx512 {
         blocks: &Blocks,
         matches: &mut Matches,
     ) -> u32 {
-        // SAFETY: `self` exists only where the instructions do.
+        // SAFETY: `self` exists only if the processor has the instructions.
         unsafe { network.run_block(lanes, blocks, matches) }
     }
 
-    /// Works out the entries of all windows.
+    /// Computes the entries of all windows.
     pub(super) fn fill_action_table(
         self,
         controller: &Controller,
         order: &WindowOrder,
         entries: &mut [u8],
     ) {
-        // SAFETY: `self` exists only where the instructions do.
+        // SAFETY: `self` exists only if the processor has the instructions.
         unsafe { avx512::actions::fill_table(controller, order, entries) }
     }
 
-    /// Turns those who turn and lists those who may move; the number of these is returned.
+    /// Turns the robots that turn and lists those that may move; returns the number of the latter.
     pub(super) fn sense_and_decide(self, sensing: Sensing<'_>) -> usize {
-        // SAFETY: `self` exists only where the instructions do.
+        // SAFETY: `self` exists only if the processor has the instructions.
         unsafe { avx512::sensing::sense_and_decide(sensing) }
     }
 }

@@ -1,5 +1,5 @@
-//! The whole action table, 32 windows at once: they differ in their lowest five bits only, so the
-//! rest of each hidden sum is one number.
+//! The whole action table, 32 windows at once: they differ only in their lowest five bits, so the
+//! rest of each hidden sum is the same number.
 
 use super::super::super::actions::{STRAIGHT, TURN_LEFT, TURN_RIGHT};
 use super::super::super::network::HiddenSum;
@@ -73,7 +73,7 @@ fn pair(even: i16, odd: i16) -> __m512i {
     _mm512_set1_epi32((u32::from(even as u16) | u32::from(odd as u16) << 16) as i32)
 }
 
-/// A table in two registers, so that packing them gives its own order.
+/// A table in two registers, arranged so that packing them restores its order.
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn in_packing_order(table: &[i32; 32]) -> (__m512i, __m512i) {

@@ -4,8 +4,8 @@ use core::arch::x86_64::*;
 use minimal_surprise_controller::activation::{SEGMENT_SCALE, SEGMENTS};
 use minimal_surprise_controller::fixed::FRACTION_BITS;
 
-/// Coefficients by segment: the eight cubics, then the constant tail for larger magnitudes. 32
-/// entries are what one permutation chooses from; 16 are used.
+/// Coefficients by segment: the eight cubics, then the constant tail for larger magnitudes. One
+/// permutation selects from 32 entries; 16 are used.
 #[repr(align(64))]
 struct Coefficients([[i16; 32]; 4]);
 

@@ -1,4 +1,4 @@
-//! AVX-512: 32 activations or 16 robots a register.
+//! AVX-512: 32 activations or 16 robots per register.
 
 pub(in super::super) mod actions;
 mod activation;

@@ -1,8 +1,8 @@
-//! Prediction networks of 32 robots: sums of 16 robots a register, activations of 32.
+//! Prediction networks of 32 robots: sums of 16 robots per register, activations of 32.
 //!
 //! Packing two registers of sums into one of activations interleaves them by fours, and unpacking
 //! undoes that. So hidden activations are in the robots' order wherever they are 32 bits wide, and
-//! windows are brought into the packed order when blocks are taken apart.
+//! windows are put into the packed order when blocks are split into steps.
 
 use super::super::super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, PAIRS};
 use super::super::super::network::PredictionWeights;
@@ -12,7 +12,7 @@ use core::arch::x86_64::*;
 /// A prediction network laid out for [`Network::run_block`].
 #[repr(align(64))]
 pub(in super::super::super) struct Network {
-    /// For each hidden neuron, the sums that each value of each five bits of a window gives.
+    /// For each hidden neuron, the sums for each value of each five bits of a window.
     inputs: [[[i32; 32]; 3]; 2 * PAIRS],
     /// Self-loop of each hidden neuron, in its half of a pair; zero in the other half.
     self_loops: [i32; 2 * PAIRS],
@@ -85,7 +85,7 @@ impl Network {
         matches: &mut Matches,
     ) -> u32 {
         let windows = windows_in_packed_order(&blocks.inputs);
-        // Turn by turn, one holds the last hidden activations and the other gets the next.
+        // In turn, one holds the last hidden activations and the other receives the next.
         let mut even = Hidden::<USED>::load(lanes);
         let mut odd = Hidden::<USED>::none();
         let at_start = _mm512_set1_epi16(self.expected_empty_at_start as i16);
@@ -119,8 +119,8 @@ impl Network {
         even.store_and_compare(lanes)
     }
 
-    /// One step: works out the next hidden activations and returns the window bits that the last
-    /// ones predict not occupied, in packed order.
+    /// Runs one step: computes the next hidden activations and returns the window bits that the
+    /// last ones predict not occupied, in packed order.
     ///
     /// The two depend on the last activations only, so neither waits for the other's results.
     #[target_feature(enable = "avx512f,avx512bw,avx512vbmi2,avx512vnni")]
@@ -163,7 +163,7 @@ impl Network {
         }
     }
 
-    /// What 16 robots' windows and last activations add up to.
+    /// The hidden sums of 16 robots, from their windows and last activations.
     #[target_feature(enable = "avx512f,avx512vnni")]
     #[inline]
     fn hidden_sum(&self, neuron: usize, windows: [__m512i; 3], last: __m512i) -> __m512i {
@@ -187,7 +187,7 @@ impl Network {
                 low = add_products(low, hidden.low[pair], weights);
                 high = add_products(high, hidden.high[pair], weights);
             }
-            // Packing saturates, which keeps the sign; the sign bit is shifted in.
+            // Packing saturates and keeps the sign; the sign bit is shifted in.
             signs = _mm512_shldi_epi16::<1>(signs, _mm512_packs_epi32(low, high));
         }
         let mut expected_empty = _mm512_setzero_si512();
@@ -200,11 +200,11 @@ impl Network {
     }
 }
 
-/// Outputs that predict neighbouring window bits.
+/// A run of outputs that predict neighbouring window bits.
 struct Run {
-    /// Their places among the signs of all outputs.
+    /// Their bits among the signs of all outputs.
     signs: u16,
-    /// How far these are from the window bits.
+    /// Distance from these bits to the window bits.
     shift: u32,
 }
 
@@ -227,7 +227,7 @@ impl Run {
     }
 }
 
-/// Windows, and windows moved on by five and by ten bits: indices of tables of 32 entries.
+/// Windows, and windows shifted by five and by ten bits: indices into tables of 32 entries.
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn by_fives(windows: __m512i) -> [__m512i; 3] {
@@ -238,7 +238,7 @@ fn by_fives(windows: __m512i) -> [__m512i; 3] {
     ]
 }
 
-/// The entries that the lowest five bits of the indices choose.
+/// The entries selected by the lowest five bits of the indices.
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn look_up(table: &[i32; 32], indices: __m512i) -> __m512i {
@@ -276,7 +276,7 @@ impl<const USED: usize> Hidden<USED> {
         hidden
     }
 
-    /// A bit for every robot whose activations were there already.
+    /// One bit per robot, set if its activations have not changed.
     #[target_feature(enable = "avx512f")]
     #[inline]
     fn store_and_compare(&self, lanes: &mut Lanes) -> u32 {
@@ -300,12 +300,12 @@ fn in_packed_order(robots: u32) -> __mmask32 {
     _mm512_movepi16_mask(_mm512_permutexvar_epi16(load(&PACKED_ORDER.0), bits))
 }
 
-/// `_mm512_dpwssd_epi32`, which in a chain the compiler would split into a multiplication and an
-/// addition, to shorten the chain; but there are other chains enough to fill the time.
+/// `_mm512_dpwssd_epi32`, which the compiler would split into a multiplication and an addition to
+/// shorten a chain; but there are enough independent chains to hide the latency.
 #[target_feature(enable = "avx512f,avx512vnni")]
 #[inline]
 fn add_products(mut sum: __m512i, a: __m512i, b: __m512i) -> __m512i {
-    // SAFETY: the instruction changes the register of `sum` only.
+    // SAFETY: the instruction changes only the register of `sum`.
     unsafe {
         core::arch::asm!(
             "vpdpwssd {sum}, {a}, {b}",
@@ -322,7 +322,7 @@ fn add_products(mut sum: __m512i, a: __m512i, b: __m512i) -> __m512i {
 #[repr(align(64))]
 struct Lookup([u16; LANES]);
 
-/// The robot in each place of the packed order.
+/// The robot at each index of the packed order.
 static PACKED_ORDER: Lookup = {
     let mut order = [0; LANES];
     let mut place = 0;
@@ -333,7 +333,7 @@ static PACKED_ORDER: Lookup = {
     Lookup(order)
 };
 
-/// The place of each robot in the packed order.
+/// The index of each robot in the packed order.
 static ROBOT_ORDER: Lookup = {
     let mut order = [0; LANES];
     let mut place = 0;
@@ -344,14 +344,14 @@ static ROBOT_ORDER: Lookup = {
     Lookup(order)
 };
 
-/// Takes two steps of eight robots from each of two registers of blocks: the first 16 places of
+/// Takes two steps of eight robots from each of two registers of blocks: the first 16 entries of
 /// the packed order, for the first step and for the second.
 static TWO_STEPS: Lookup = {
     let mut places = [0; LANES];
     let mut place = 0;
     while place < LANES {
         let robot = PACKED_ORDER.0[place % 16] as usize;
-        // Robots from 16 on are in the second register.
+        // Robots 16 and above are in the second register.
         let block = robot % 16 + robot / 16 * 8;
         places[place] = (block * BLOCK_STEPS + place / 16) as u16;
         place += 1;

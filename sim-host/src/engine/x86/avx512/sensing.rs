@@ -1,8 +1,8 @@
 //! Sensing and deciding of 16 robots at once.
 //!
 //! On boards whose lines are single words, all lines are kept in registers, and a permutation
-//! fetches each robot's; on wider ones, gathers do. Then the three lines are rotated so that the
-//! robot's cells are where the window has them, and merged.
+//! fetches each robot's lines; on wider boards, gathers fetch them. Then the three lines are
+//! rotated so that the robot's cells are at their window bits, and merged.
 
 use super::super::super::actions::ENTRY_SHIFT;
 use super::super::super::board::{Board, Plane};
@@ -16,7 +16,7 @@ use core::arch::x86_64::*;
 const Y_SHIFT: u32 = POSITION.trailing_ones() / 2;
 const COORDINATE: i32 = (1 << Y_SHIFT) - 1;
 
-/// Turns those who turn and lists those who may move; the number of these is returned.
+/// Turns the robots that turn and lists those that may move; returns the number of the latter.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi2,gfni")]
 pub(in super::super) fn sense_and_decide(sensing: Sensing<'_>) -> usize {
     let board = sensing.board;
@@ -34,8 +34,8 @@ pub(in super::super) fn sense_and_decide(sensing: Sensing<'_>) -> usize {
     }
 }
 
-/// What a robot may see, in the lowest 15 bits; others are undefined. `upright` are the robots
-/// facing north or south.
+/// The cells around a robot, in the lowest 15 bits; other bits are undefined. `upright` are the
+/// robots facing north or south.
 type Fetched = __m512i;
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi2,gfni")]
@@ -88,8 +88,8 @@ fn all_robots(
         let reading = match flips {
             None => seen,
             Some(flips) => {
-                // SAFETY: 16 bits are read for each robot present, of which there are as many
-                // flips, and none elsewhere.
+                // SAFETY: 16 bits are read for each robot present, and there are as many flips as
+                // robots.
                 let flips =
                     unsafe { _mm256_maskz_loadu_epi16(present, flips[first..].as_ptr().cast()) };
                 _mm512_xor_si512(seen, _mm512_cvtepu16_epi32(flips))
@@ -101,11 +101,11 @@ fn all_robots(
             action_bit,
         );
         let window = _mm512_or_si512(reading, last_action);
-        // SAFETY: a window is below 2¹⁵, and the table has that many bytes and three more.
+        // SAFETY: a window is below 2¹⁵, and the table has that many bytes plus three.
         let entry = unsafe { _mm512_i32gather_epi32::<1>(window, entries.as_ptr().cast()) };
         let entry = _mm512_slli_epi32::<ENTRY_SHIFT>(entry);
         let turned = _mm512_add_epi32(word, entry);
-        // Bit by bit, the entry where the mask is one, else the word.
+        // Bitwise: the entry where the mask is one, otherwise the word.
         let word = _mm512_ternarylogic_epi32::<0xca>(action, entry, turned);
         // SAFETY: as above.
         unsafe { _mm512_storeu_si512(words.as_mut_ptr().cast(), word) };
@@ -136,7 +136,7 @@ fn robots_present(left: usize) -> __mmask16 {
     }
 }
 
-/// The window as a robot facing the other way sees it: its 15 bits in reverse order.
+/// The window of a robot facing the opposite way: its 15 bits in reverse order.
 #[target_feature(enable = "avx512f,avx512bw,gfni")]
 #[inline]
 fn half_a_turn_on(window: __m512i) -> __m512i {
@@ -163,10 +163,10 @@ fn merge(right: __m512i, middle: __m512i, left: __m512i) -> Fetched {
     _mm512_ternarylogic_epi32::<0xca>(first_two, two, left)
 }
 
-/// Rows and columns of a board of at most 16 · `N` of each, the borders at the ends of lines
-/// filled in, and each rotated to where its cells come in a window.
+/// Rows and columns of a board with at most 16 · `N` of each. The borders at the ends of lines are
+/// filled in, and each line is rotated to the position of its cells in a window.
 struct LinesInRegisters<const N: usize> {
-    /// By robot's line: the line before, the line, the line after.
+    /// Indexed by the robot's line: the line before it, the line, the line after it.
     rows: [[__m512i; N]; 3],
     columns: [[__m512i; N]; 3],
     width: __m512i,
@@ -194,7 +194,7 @@ impl<const N: usize> LinesInRegisters<N> {
         let side = _mm_cvtsi32_si128(plane.side() as i32);
         core::array::from_fn(|row| {
             core::array::from_fn(|n| {
-                // SAFETY: 16 words are read from place 2 + 16 on at most.
+                // SAFETY: 16 words are read, starting at index 2 + 16 at most.
                 let own = unsafe { _mm512_loadu_si512(padded.as_ptr().add(row + 16 * n).cast()) };
                 let line = _mm512_or_si512(
                     own,
@@ -268,8 +268,8 @@ impl<'a> LinesInMemory<'a> {
         let shift = _mm512_and_si512(along, _mm512_set1_epi32(7));
         let [right, middle, left] = core::array::from_fn(|row| {
             // SAFETY: `line` and `along` are a robot's, which is on the board. So `place` is in the
-            // line before it, and each of the three reads of four bytes ends at most one word
-            // after the last line, a word that planes have.
+            // line before it, and each of the three reads of four bytes ends at most one word after
+            // the last line; planes have that word.
             let words = unsafe {
                 let lines = plane.words().as_ptr().cast::<u8>().add(row * line_bytes);
                 _mm512_mask_i32gather_epi32::<1>(zero, robots, place, lines.cast())
