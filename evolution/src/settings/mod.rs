@@ -78,8 +78,8 @@ pub struct Settings {
     ancestor: Option<Genome>,
 }
 
-/// A problem with the setting of this name.
-type Problem = (&'static str, String);
+/// A problem with one of these settings: the first that was given, or the first.
+type Problem = (&'static [&'static str], String);
 
 impl SettingsBuilder {
     /// Checks the settings.
@@ -90,9 +90,9 @@ impl SettingsBuilder {
         let mut values = self.0;
         let seed = values.seed.unwrap_or(0);
         values.seed = Some(seed);
-        checked(values.clone()).map_err(|(key, problem)| SettingError::Invalid {
-            place: Place::Builder(key),
-            value: setting(key)
+        checked(values.clone()).map_err(|(keys, problem)| SettingError::Invalid {
+            place: Place::Builder(keys[0]),
+            value: setting(keys[0])
                 .and_then(|setting| (setting.get)(&values))
                 .map_or_else(|| "(default)".to_owned(), |value| value.to_string()),
             problem,
@@ -118,7 +118,7 @@ impl Settings {
         let mut values = overrides.values()?;
         values.seed.get_or_insert_with(draw_seed);
         (values.threads, values.out) = (None, None);
-        checked(values).map_err(|(key, problem)| overrides.invalid(key, problem))
+        checked(values).map_err(|(keys, problem)| overrides.invalid(keys, problem))
     }
 
     /// Sensor model and predictions.
@@ -260,10 +260,10 @@ const DEFAULT_MUTATION: f64 = 0.1;
 /// Checks values that are valid by themselves against each other.
 fn checked(mut values: Values) -> Result<Settings, Problem> {
     let topology = topology(&values)?;
-    let noise =
-        NoiseRate::new(values.noise).ok_or_else(|| ("noise", values::PROBABILITY.to_owned()))?;
+    let noise = NoiseRate::new(values.noise)
+        .ok_or_else(|| (&["noise"][..], values::PROBABILITY.to_owned()))?;
     let scenario = Scenario::new(values.grid, values.robots, values.steps, noise)
-        .map_err(|error| ("robots", error.to_string()))?;
+        .map_err(|error| (&["robots"][..], error.to_string()))?;
     let partly_20x20 = matches!(topology.prediction(), Prediction::PartlyPredefined(_))
         && (values.grid.width(), values.grid.height()) == (20, 20);
     let default_mutation = if partly_20x20 { 0.3 } else { DEFAULT_MUTATION };
@@ -273,13 +273,13 @@ fn checked(mut values: Values) -> Result<Settings, Problem> {
         selection: values.selection,
         crossover_per_2_32: per_2_32(values.crossover),
         mutation: MutationRate::from_per_2_32(per_2_32(mutation))
-            .ok_or_else(|| ("mutation", values::PROBABILITY.to_owned()))?,
+            .ok_or_else(|| (&["mutation"][..], values::PROBABILITY.to_owned()))?,
     };
     let matches_max = scenario.scored_bits(topology.sensors());
     if matches_max.checked_mul(values.population.into()).is_none() {
         let Values { robots, steps, .. } = values;
         return Err((
-            "population",
+            &["population", "robots", "steps"],
             format!(
                 "{robots} robots and {steps} steps: the matches of a generation would not fit 64 \
                  bits; lower one of them or the population"
@@ -288,7 +288,9 @@ fn checked(mut values: Values) -> Result<Settings, Problem> {
     }
     let ancestor = match &values.from {
         None => None,
-        Some(path) => Some(read_genome_for(path, topology).map_err(|problem| ("from", problem))?),
+        Some(path) => {
+            Some(read_genome_for(path, topology).map_err(|problem| (&["from"][..], problem))?)
+        }
     };
     Ok(Settings {
         topology,
@@ -301,13 +303,16 @@ fn checked(mut values: Values) -> Result<Settings, Problem> {
 
 /// The topology that the settings ask for.
 fn topology(values: &Values) -> Result<Topology, Problem> {
-    let (key, prediction) = match (values.predefine, values.predefine_partly) {
-        (None, None) => ("predefine", Prediction::Free),
-        (Some(template), None) => ("predefine", Prediction::Predefined(template)),
-        (None, Some(template)) => ("predefine-partly", Prediction::PartlyPredefined(template)),
+    let (key, prediction): (&[_], _) = match (values.predefine, values.predefine_partly) {
+        (None, None) => (&["predefine"], Prediction::Free),
+        (Some(template), None) => (&["predefine"], Prediction::Predefined(template)),
+        (None, Some(template)) => (
+            &["predefine-partly"],
+            Prediction::PartlyPredefined(template),
+        ),
         (Some(_), Some(_)) => {
             return Err((
-                "predefine",
+                &["predefine"],
                 "predefine and predefine-partly exclude each other".to_owned(),
             ));
         }

@@ -133,7 +133,7 @@ impl Overrides {
     /// # Errors
     /// [`SettingError`] if there is none.
     pub fn topology(&self) -> Result<Topology, SettingError> {
-        super::topology(&self.values()?).map_err(|(key, problem)| self.invalid(key, problem))
+        super::topology(&self.values()?).map_err(|(keys, problem)| self.invalid(keys, problem))
     }
 
     /// The values, over the defaults.
@@ -142,7 +142,7 @@ impl Overrides {
         for setting in SETTINGS {
             if let Some((text, _)) = self.values.get(setting.name) {
                 (setting.set)(&mut values, text)
-                    .map_err(|problem| self.invalid(setting.name, problem))?;
+                    .map_err(|problem| self.invalid(&[setting.name], problem))?;
             }
         }
         match (self.place("predefine"), self.place("predefine-partly")) {
@@ -154,10 +154,11 @@ impl Overrides {
         }
     }
 
-    /// An error about a setting; if it was not given, about its default.
-    pub(super) fn invalid(&self, key: &'static str, problem: String) -> SettingError {
-        let given = self.values.get(key).cloned();
-        let (value, place) = given.unwrap_or_else(|| ("(default)".to_owned(), Place::Flag(key)));
+    /// An error about the first of these settings that was given, or the default of the first.
+    pub(super) fn invalid(&self, keys: &[&'static str], problem: String) -> SettingError {
+        let mut given = keys.iter().filter_map(|key| self.values.get(key).cloned());
+        let default = || ("(default)".to_owned(), Place::Flag(keys[0]));
+        let (value, place) = given.next().unwrap_or_else(default);
         SettingError::Invalid {
             place,
             value,
