@@ -144,8 +144,8 @@ pub fn checked_identifier(text: &str) -> Result<&str, &'static str> {
         Ok(text)
     } else {
         Err(
-            "expected an identifier of C and Rust: up to 63 letters, digits and _, a letter first, \
-             no keyword",
+            "expected a C and Rust identifier: up to 63 letters, digits and _, starting with a letter, \
+             and not a keyword",
         )
     }
 }

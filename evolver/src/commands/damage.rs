@@ -107,7 +107,9 @@ pub(super) fn corners(text: &str) -> Result<[u32; 4], String> {
         .collect();
     numbers
         .and_then(|numbers| numbers.try_into().ok())
-        .ok_or_else(|| "expected four cells from the south-west corner, as in 2,3,6,7".to_owned())
+        .ok_or_else(|| {
+            "expected four coordinates from the south-west cell, such as 2,3,6,7".to_owned()
+        })
 }
 
 fn structure_named(text: &str) -> Result<Structure, String> {

@@ -63,7 +63,7 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
             told => told.map_err(failed)?,
         };
         let Some((report, line)) = told else {
-            tell!("{port}: it was restarted; {}", robot.identity());
+            tell!("{port}: the robot restarted; {}", robot.identity());
             before = None;
             continue;
         };

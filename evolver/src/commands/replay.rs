@@ -206,7 +206,7 @@ fn recording(arguments: &ReplayArgs) -> anyhow::Result<Recording> {
     ] {
         if given.is_some() {
             return Err(BadInput::new(format!(
-                "--{flag}: {name} is not a run directory, whose final state could be damaged"
+                "--{flag}: {name} is not a run directory; only the final state of a run can be damaged"
             ))
             .into());
         }

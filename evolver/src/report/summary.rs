@@ -75,12 +75,12 @@ pub fn evolved(experiment: &Experiment, finding: &EvolutionResult, directory: &P
          hash          {hash}\n\
          run           {directory}\n\n\
          next:\n  \
-         watch it               {program} replay {directory}\n  \
+         replay the run         {program} replay {directory}\n  \
          measure the run        {program} classify {directory}\n  \
-         from other starts      {program} evaluate {directory}\n  \
-         look into the genome   {program} inspect {genome}\n  \
+         re-evaluate it         {program} evaluate {directory}\n  \
+         inspect the genome     {program} inspect {genome}\n  \
          evolve it further      {program} evolve --from {genome}\n  \
-         the same run again     {program} evolve {config}\n",
+         repeat the run         {program} evolve {config}\n",
         members = if stdout_is_ascii() {
             "starred"
         } else {

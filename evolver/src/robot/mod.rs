@@ -80,7 +80,7 @@ pub fn fault_names(faults: Faults) -> Vec<&'static str> {
     let unknown = names
         .iter()
         .fold(faults.0, |bits, (fault, _)| bits & !fault.0);
-    let unknown = (unknown != 0).then_some("a fault unknown to this program");
+    let unknown = (unknown != 0).then_some("an unknown fault");
     set.map(|(_, name)| name).chain(unknown).collect()
 }
 
