@@ -123,7 +123,7 @@ fn the_page_shows_the_same_scenes_as_the_program_and_hashes_the_steps_of_the_run
         let hash: String = browser.evaluate("replay.state().check.computed");
         assert_eq!(hash, recording.origin.steps_hash.as_ref().unwrap().hash);
         let fitness: f64 = browser.evaluate(&format!("replay.fitness({})", recording.steps()));
-        let ours = *recording.minds.unwrap().fitness.last().unwrap();
+        let ours = *recording.controller.unwrap().fitness.last().unwrap();
         assert!((fitness - ours).abs() < 1e-12, "{fitness} {ours}");
     }
     browser.assert_quiet();
@@ -240,13 +240,13 @@ fn a_click_on_a_robot_shows_what_it_predicts_and_senses() {
           return [box.left + (x + 0.5) * box.width / 15, box.top + (14.5 - y) * box.height / 15]; })()",
     );
     browser.click(x, y);
-    browser.wait_for("document.getElementById('mind-text').textContent.startsWith('Robot 17 ')");
+    browser.wait_for("document.getElementById('world-model-text').textContent.startsWith('Robot 17 ')");
     let recording = recording_of(&evolver, "runs/run");
     let (sensed, predicted) = (recording.sensed(50, 17), recording.predicted(50, 17));
     let right = 14 - sensed.unwrap().differing(predicted.unwrap());
-    let words: String = browser.evaluate("document.getElementById('mind-text').textContent");
+    let words: String = browser.evaluate("document.getElementById('world-model-text').textContent");
     assert!(
-        words.contains(&format!("{right} of 14 sensors as it predicted")),
+        words.contains(&format!("{right} of 14 sensors predicted correctly")),
         "{words}"
     );
     let shown = |view: usize| {

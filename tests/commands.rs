@@ -315,11 +315,11 @@ fn genome_text_is_converted_to_genome_files_and_rounding_is_reported() {
         let imported = evolver.run(&[&flags[..], &["--out", model]].concat());
         assert_eq!(imported.code, Some(0), "{imported:?}");
         assert!(
-            imported.stdout.contains("largest rounding 1."),
+            imported.stdout.contains("largest rounding error 1."),
             "{imported:?}"
         );
         assert!(
-            imported.stdout.contains("0 weights that did not fit"),
+            imported.stdout.contains("0 weights out of range"),
             "{imported:?}"
         );
         let shown = evolver.run(&["inspect", &format!("{model}/generation-2.genome")]);

@@ -309,7 +309,7 @@ fn a_port_with_a_blank_or_a_line_end_is_shown_in_one_line_and_can_be_typed() {
         symlink(&robot.device.port, evolver.folder().join(port)).unwrap();
         let port = format!("--port={port}");
         let run = evolver.run(&["hil", "new.genome", &port]);
-        assert_refused(&run, &["put that onto it with: evolver flash new.genome"]);
+        assert_refused(&run, &["write that genome to it with: evolver flash new.genome"]);
         let (_, line) = run.stderr.split_once("with: evolver ").unwrap();
         let program = evolver.program().display();
         let typed = evolver.shell(&format!("{program} {line}"));
@@ -350,7 +350,7 @@ fn another_device_is_refused() {
         }
     };
     let echo = Device::plug_in(|bytes| Answer::Bytes(bytes.to_vec()));
-    another(&echo, "sends back");
+    another(&echo, "echoes");
     let modem = Device::plug_in(|_| Answer::Bytes(b"ERROR\r\n".to_vec()));
     another(&modem, "bytes without a message");
     let newer = Device::plug_in(|_| {
@@ -423,7 +423,7 @@ fn a_robot_whose_write_count_is_exhausted_says_what_to_do_and_is_restored() {
         let words = [
             "has reached its maximum",
             "erase both of its genome slots with a debug probe",
-            "it keeps the genome that it had",
+            "it keeps its old genome",
         ];
         assert_failed(&run, &words);
         let mut robot = robot.robot();
@@ -468,11 +468,11 @@ fn after_a_refusal_halfway_the_robot_is_restored() {
             assert_failed(&run, &[&words, &refusal.to_string()]);
             let kept = match (command, refusal) {
                 ("hil", _) => "",
-                (_, Refusal::Flash) => "; it has either the genome that it had or the new one",
-                _ => "; it keeps the genome that it had",
+                (_, Refusal::Flash) => "; it has either its old genome or the new one",
+                _ => "; it keeps its old genome",
             };
             assert_eq!(
-                run.stderr.contains("genome that it had"),
+                run.stderr.contains("its old genome"),
                 command == "flash",
                 "{run:?}"
             );
@@ -494,7 +494,7 @@ fn a_line_unplugged_halfway_leaves_the_old_genome_in_use() {
     for done in 1..=6 {
         for (fault, words) in [
             (Fault::PulledAfter(done), "the line broke"),
-            (Fault::MuteAfter(done), "no answer any more"),
+            (Fault::MuteAfter(done), "stopped answering"),
         ] {
             // The longest time-out is that of an erase.
             if fault == Fault::MuteAfter(2) && !full::all_cases() {
@@ -505,7 +505,7 @@ fn a_line_unplugged_halfway_leaves_the_old_genome_in_use() {
             let keeps = if done == 1 {
                 "starting or stopping"
             } else {
-                "it keeps the genome that it had"
+                "it keeps its old genome"
             };
             assert_failed(&run, &[&robot.device.port, words, keeps]);
             let restarted = PluggedRobot::start(robot.stop(), Fault::None);
@@ -525,7 +525,7 @@ fn a_line_unplugged_during_monitor_or_hil_is_reported() {
     assert_failed(&run, &["the line broke while the robot was stepping"]);
     let robot = with_the_old_genome(&evolver, Fault::MuteAfter(20));
     let run = evolver.run(&["hil", "old.genome", "--port", &robot.device.port]);
-    assert_failed(&run, &["no answer any more, while the robot was stepping"]);
+    assert_failed(&run, &["the robot stopped answering while it was stepping"]);
 
     let robot = with_the_old_genome(&evolver, Fault::None);
     let port = robot.device.port.clone();
@@ -546,7 +546,7 @@ fn a_commit_whose_answer_is_lost_is_detected() {
     let chunks = evolver.read("new.genome").len().div_ceil(128) as u64;
     let robot = with_the_old_genome(&evolver, Fault::MuteAfter(3 + chunks));
     let run = flash(&evolver, "new.genome", &robot.device.port);
-    let words = "either the genome that it had or the new one: run the command again";
+    let words = "either its old genome or the new one: run the command again";
     assert_failed(&run, &["committing a genome", words]);
     let new = crc_of(&evolver.read("new.genome"));
     assert!(crc_in_use(&robot).contains(&new));
@@ -554,7 +554,7 @@ fn a_commit_whose_answer_is_lost_is_detected() {
 
 /// The command that starts a robot on this port.
 fn start_line(port: &str) -> String {
-    format!("the robot may be standing now; start it with: evolver start --port {port}")
+    format!("the robot may be stopped now; start it with: evolver start --port {port}")
 }
 
 /// Waits until the robot has carried out this many requests.
@@ -574,7 +574,7 @@ fn start_and_stop_work_and_say_so() {
     for (command, state, running) in [
         ("start", "running", true),
         ("start", "running", true),
-        ("stop", "standing", false),
+        ("stop", "stopped", false),
     ] {
         let run = evolver.run(&[command, "--port", port]);
         assert_eq!(run.code, Some(0), "{run:?}");
@@ -686,7 +686,7 @@ fn wait_applies_only_to_the_first_answer() {
                 let started = Instant::now();
                 let run = evolver.run(&["flash", "new.genome", "--port", port, "--wait", wait]);
                 let waited = started.elapsed().as_secs_f64();
-                assert_failed(&run, &["no answer any more, while the robot was receiving"]);
+                assert_failed(&run, &["the robot stopped answering while it was receiving"]);
                 // Five attempts of half a second.
                 assert!((2.5..20.0).contains(&waited), "{wait}: {waited}");
             });

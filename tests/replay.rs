@@ -422,11 +422,11 @@ fn requests_for_what_a_run_does_not_have_are_refused() {
         ),
         (
             "run --svg a --width-mm 50 --remove 0,0,3,3",
-            &["--width-mm = 50", "words of this picture need", "mm"],
+            &["--width-mm = 50", "text of this picture needs", "mm"],
         ),
         (
             "run --svg a --width-mm 40 --what predictions",
-            &["--width-mm = 40", "words of this picture need"],
+            &["--width-mm = 40", "text of this picture needs"],
         ),
         ("run --png a --dpi 0", &["--dpi = 0", "50 to 1200"]),
         (

@@ -197,8 +197,8 @@ fn a_selected_robot_shows_what_it_senses_and_what_it_had_predicted() {
             assert_eq!(cell(&terminal, grid, x, y).0, mark, "{x}, {y} of {robot}");
         }
         let rows = terminal.screen().contents();
-        let (foreseen, missed) = (hits, cells.len() - hits);
-        assert!(rows.contains(&format!("foreseen {foreseen:>2} ")), "{rows}");
+        let (predicted, missed) = (hits, cells.len() - hits);
+        assert!(rows.contains(&format!("as predicted {predicted:>2} ")), "{rows}");
         assert!(
             rows.contains(&format!("mispredicted {missed:>2} ")),
             "{rows}"
@@ -215,9 +215,9 @@ fn a_selected_robot_shows_what_it_senses_and_what_it_had_predicted() {
     terminal.wait_while("robot 1 at");
     terminal.after(HOME, "step  0 of 60");
     terminal.after("p", "robot 99 at");
-    terminal.after("c", "not surprised");
+    terminal.after("c", "no sensor mispredicted");
     terminal.types("c");
-    terminal.wait_while("not surprised");
+    terminal.wait_while("no sensor mispredicted");
     terminal.after("c", "another structure");
 }
 
@@ -306,7 +306,7 @@ fn damage_is_shown_where_it_occurred_with_the_swarm_before_it() {
             assert_eq!(mark == "░", inside, "{x}, {y}");
         }
     }
-    terminal.after("b", "as it was before");
+    terminal.after("b", "before damage");
     assert_eq!(swarm(&terminal, grid), draw(grid, &before));
     terminal.after("b", "b shows the swarm before");
     assert_eq!(swarm(&terminal, grid), draw(grid, &left));
@@ -543,7 +543,7 @@ fn a_trajectory_is_played_without_predictions() {
     let mut terminal = Terminal::start(&evolver, WINDOW, &[], &["replay", "agent_trajectory"]);
     terminal.wait_for("q quit");
     assert!(terminal.screen().contents().contains("poses only"));
-    terminal.after("n", "nothing is known of its mind");
+    terminal.after("n", "predictions are unknown");
     terminal.after(END, "step 60 of 60");
     let shown = swarm(&terminal, grid);
     assert_eq!(shown, draw(grid, &final_json(&evolver, "final")));

@@ -1,4 +1,4 @@
-//! Locks: a directory that is in use, and by whom.
+//! Locks: which process uses a directory.
 
 use crate::files::FileError;
 use std::fmt;
@@ -6,39 +6,39 @@ use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
 use std::path::Path;
 
-/// The lock's file in the directory. It says who holds the lock.
+/// The lock file in the directory. It names the holder of the lock.
 pub const LOCK: &str = ".lock";
 
-/// A directory taken by this process for as long as this lives, where the file system knows locks;
-/// where it does not, there is nothing to hold.
+/// A directory locked by this process until this is dropped. On a file system without locks, it
+/// holds nothing.
 #[derive(Debug)]
 pub struct Lock {
     _file: Option<File>,
 }
 
-/// A directory cannot be taken.
+/// A directory could not be locked.
 #[derive(Debug)]
 pub enum LockError {
-    /// Another process has it; it says who it is, unless it has taken it just now.
+    /// Another process holds the lock; it is named unless it took the lock just now.
     Held(Option<Holder>),
-    /// The lock's file cannot be used.
+    /// The lock file could not be used.
     File(FileError),
 }
 
-/// Who holds a lock.
+/// The holder of a lock.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Holder {
-    /// The name of its host.
+    /// Host name.
     pub host: String,
-    /// The number of its process there.
+    /// Process id on that host.
     pub process: u32,
 }
 
 impl Lock {
-    /// Takes a directory.
+    /// Locks a directory.
     ///
     /// # Errors
-    /// [`LockError`] if another process has it, or its file cannot be used.
+    /// [`LockError`] if another process holds the lock, or the lock file cannot be used.
     pub fn take(directory: &Path) -> Result<Self, LockError> {
         let path = directory.join(LOCK);
         let mut options = File::options();
@@ -47,7 +47,7 @@ impl Lock {
         let mut file = file.map_err(LockError::File)?;
         match file.try_lock() {
             Ok(()) => {
-                // For others to read; without it, too, the lock is held.
+                // Only informs others; if it fails, the lock is held all the same.
                 let _ = Holder::this_process().write(&mut file);
                 Ok(Self { _file: Some(file) })
             }
@@ -56,8 +56,8 @@ impl Lock {
         }
     }
 
-    /// Takes a directory whose holder has ended on this host. There are file systems whose locks
-    /// are not seen by other hosts, so nothing is known of a holder there.
+    /// Locks a directory whose last holder was a process of this host that has ended. Some file
+    /// systems do not show locks to other hosts, so a holder on another host may still be running.
     pub fn take_abandoned(directory: &Path) -> Option<Self> {
         let options = File::options()
             .read(true)
@@ -78,20 +78,20 @@ impl Holder {
         }
     }
 
-    /// In one step over what the last holder wrote, of which a longer end is cut off then; who
-    /// reads looks at the first line only.
+    /// Overwrites the last holder's line in one step, then cuts off a longer rest; readers use only
+    /// the first line.
     fn write(&self, file: &mut File) -> std::io::Result<()> {
         let line = format!("{} {}\n", self.host, self.process);
         file.write_all(line.as_bytes())?;
         file.set_len(line.len() as u64)
     }
 
-    /// Reads what a lock's file says.
+    /// Reads a lock file.
     pub fn read(file: impl Read) -> Option<Self> {
         let mut text = String::new();
         file.take(400).read_to_string(&mut text).ok()?;
         let (host, process) = text.split_once('\n')?.0.rsplit_once(' ')?;
-        // It is shown on terminals.
+        // It is printed on terminals.
         let is_name = host.chars().all(|c| c.is_ascii_graphic());
         is_name.then_some(Self {
             host: host.to_owned(),
@@ -106,7 +106,7 @@ impl fmt::Display for Holder {
     }
 }
 
-/// Who holds a lock, in words.
+/// The holder of a lock, in words.
 #[must_use]
 pub fn named(holder: Option<&Holder>) -> String {
     holder.map_or_else(|| "another process".to_owned(), Holder::to_string)

@@ -1,15 +1,14 @@
-//! Directories that are there as a whole or not at all, however many processes make the same one.
+//! Directories that appear complete or not at all, even if several processes create the same one.
 //!
-//! A directory is made beside its place under a name of its own, and renamed. While it is made it
-//! is locked, so that what a process leaves behind that is killed meanwhile can be told from what
-//! another process is still making.
+//! A directory is created beside its place under a temporary name, then renamed. It is locked until
+//! then, so that leftovers of killed processes can be told from directories still being written.
 
 use crate::files::{self, FileError};
 use crate::lock::{LOCK, Lock, LockError};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A directory that is being made. Dropped before it is published, it is removed.
+/// A directory being created. If it is dropped before it is published, it is removed.
 #[derive(Debug)]
 pub struct NewDir {
     part: PathBuf,
@@ -18,20 +17,20 @@ pub struct NewDir {
 }
 
 impl NewDir {
-    /// An empty directory beside its place, locked; directories above it are made.
+    /// Creates an empty, locked directory beside its place, and all missing parents.
     ///
     /// # Errors
-    /// [`FileError`] if there is something in that place ([`FileError::is_exists`]), or it cannot
-    /// be made.
+    /// [`FileError`] if the place exists ([`FileError::is_exists`]), or the directory cannot be
+    /// created.
     pub fn beside(place: &Path) -> Result<Self, FileError> {
         refuse_existing(place)?;
         Self::unchecked_beside(place)
     }
 
-    /// [`NewDir::beside`], also if something has appeared in that place: publishing fails then.
+    /// [`NewDir::beside`], but the place may exist; publishing then fails.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be made.
+    /// [`FileError`] if the directory cannot be created.
     pub fn unchecked_beside(place: &Path) -> Result<Self, FileError> {
         let parent = files::parent(place);
         fs::create_dir_all(parent).map_err(FileError::at(parent))?;
@@ -48,23 +47,23 @@ impl NewDir {
                 }
                 Err(error) => error,
             };
-            // It is empty and of no use; that it cannot be removed changes nothing.
+            // It is empty and unused: failure to remove it is ignored.
             let _ = fs::remove_dir_all(&part);
             match error {
-                // Somebody who tidies up looked at it before it was locked.
+                // Another process's cleanup looked at it before it was locked.
                 LockError::Held(_) => {}
                 LockError::File(error) => return Err(FileError::at(place)(error.error)),
             }
         }
     }
 
-    /// Where its files are written.
+    /// Where to write its files.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.part
     }
 
-    /// An error about a file in it, said of the place where the file was to be in the end.
+    /// Rewrites an error about a file in it to name the file's final place.
     pub fn in_place(&self, error: FileError) -> FileError {
         match error.path.strip_prefix(&self.part) {
             Ok(file) => FileError::at(&self.place.join(file))(error.error),
@@ -72,7 +71,7 @@ impl NewDir {
         }
     }
 
-    /// Puts it in its place, without the lock's file.
+    /// Renames it to its place, without the lock file.
     ///
     /// # Errors
     /// As [`NewDir::publish_locked`].
@@ -82,11 +81,11 @@ impl NewDir {
         self.publish_locked().map(drop)
     }
 
-    /// Puts it in its place, where it stays locked.
+    /// Renames it to its place, where it stays locked.
     ///
     /// # Errors
-    /// [`FileError`] if there is something in that place now ([`FileError::is_exists`]), or it
-    /// cannot be renamed; what was made is removed then.
+    /// [`FileError`] if the place exists now ([`FileError::is_exists`]), or the directory cannot be
+    /// renamed; it is then removed.
     pub fn publish_locked(mut self) -> Result<Lock, FileError> {
         if let Err(error) = fs::rename(&self.part, &self.place) {
             refuse_existing(&self.place)?;
@@ -99,13 +98,13 @@ impl NewDir {
 impl Drop for NewDir {
     fn drop(&mut self) {
         if self.lock.is_some() {
-            // It is of no use; that it cannot be removed changes nothing.
+            // It is unused: failure to remove it is ignored.
             let _ = fs::remove_dir_all(&self.part);
         }
     }
 }
 
-/// A rename replaces an empty directory.
+/// Needed because a rename replaces an empty directory.
 fn refuse_existing(place: &Path) -> Result<(), FileError> {
     match place.symlink_metadata() {
         Ok(_) => Err(FileError::exists(place)),
@@ -113,9 +112,8 @@ fn refuse_existing(place: &Path) -> Result<(), FileError> {
     }
 }
 
-/// Removes what processes of this host left in a directory that were killed while they made
-/// another one in it. What is locked is still being made; where the file system knows no locks,
-/// nothing is removed.
+/// Removes the unfinished directories that killed processes of this host left in a directory.
+/// Locked ones are still being written; on a file system without locks, nothing is removed.
 pub fn remove_abandoned(directory: &Path) {
     for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
         if !files::is_part(&entry.file_name()) {
@@ -140,11 +138,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_being_made_is_never_tidied_up_and_what_was_abandoned_is() {
+    fn abandoned_directories_are_removed_and_unfinished_ones_are_not() {
         let scratch = tempfile::tempdir().unwrap();
         let place = scratch.path().join("place");
         let making = NewDir::beside(&place).unwrap();
-        // As after a kill: the directory is there, and nobody holds its lock.
+        // As after a kill: the directory exists, and its lock is free.
         let abandoned = NewDir::beside(&place).unwrap();
         fs::write(abandoned.path().join("file"), "text").unwrap();
         let mut abandoned = std::mem::ManuallyDrop::new(abandoned);
@@ -164,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_in_the_place_stays_and_nothing_is_left_beside_it() {
+    fn an_existing_directory_stays_and_nothing_is_left_beside_it() {
         let scratch = tempfile::tempdir().unwrap();
         let place = scratch.path().join("place");
         let [first, second, third] = [(); 3].map(|()| NewDir::beside(&place).unwrap());
@@ -180,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn making_and_tidying_up_at_once_never_meet() {
+    fn creating_and_cleaning_up_at_once_do_not_interfere() {
         let scratch = tempfile::tempdir().unwrap();
         std::thread::scope(|scope| {
             for thread in 0..4 {

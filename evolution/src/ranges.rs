@@ -1,10 +1,10 @@
-//! What is read from a run directory is checked here, while it is parsed: a value out of its range
-//! is an error with the place of the value, and reaches no drawing and no loop.
+//! Range checks on values read from a run directory, made while parsing: a value out of range is an
+//! error that names its position, so that drawings and loops only see valid values.
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
-/// Longest time that is believed, in seconds: about 300 years.
+/// Longest valid time, in seconds: about 300 years.
 const SECONDS_MAX: f64 = 1e10;
 
 /// A number from 0 to 1.
@@ -50,7 +50,7 @@ fn to_1<E: Error>(value: f64) -> Result<f64, E> {
     Err(E::custom(format!("{value}; expected a number from 0 to 1")))
 }
 
-/// A SHA-256 as files hold it, white space around it.
+/// A SHA-256 as in a file, with white space around it.
 pub(crate) fn hash_of(text: &str) -> Result<String, String> {
     let hash = text.trim();
     let is_digit = |c: char| matches!(c, '0'..='9' | 'a'..='f');

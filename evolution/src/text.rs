@@ -1,5 +1,5 @@
-//! Text that users chose, turned into what a file system, a page, a link, a shell, a compiler or a
-//! terminal reads as that text and as nothing else; and the way in: bytes of a text file into text.
+//! Escaping: text from users for file names, pages, links, shells, compilers and terminals, so that
+//! it cannot be read as anything else. And decoding: bytes of a text file into text.
 
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_decode_str, percent_encode};
 use sha2::{Digest, Sha256};
@@ -8,19 +8,19 @@ use std::ffi::{OsStr, OsString};
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
-/// Most bytes of a [`file_name`]: file systems take 255, so that endings, and the names of
-/// temporary files made of it, have room.
+/// Longest [`file_name`], in bytes: file systems allow 255, which leaves room for endings and
+/// temporary names.
 pub const FILE_NAME_BYTES_MAX: usize = 100;
 
 /// Hexadecimal digits of the hash in a [`file_name`].
 const HASH_DIGITS: usize = 12;
 
-/// What Windows takes for a device, whatever follows a dot after it.
+/// Device names on Windows, with any ending.
 const DEVICES: [&str; 6] = ["con", "prn", "aux", "nul", "com", "lpt"];
 
-/// A name for a file, from any text. Different texts get different names, also where the file
-/// system ignores case. A text of `a` to `z`, `0` to `9`, `-`, `_` and `.` is its own name; any
-/// other keeps its letters and digits and gets a hash of the whole text at the end.
+/// A file name for any text. Different texts get different names, even on file systems that ignore
+/// case. A text of `a` to `z`, `0` to `9`, `-`, `_` and `.` is used as it is; any other keeps its
+/// letters and digits and gets a hash of the whole text at the end.
 #[must_use]
 pub fn file_name(text: &str) -> String {
     if is_file_name(text) {
@@ -30,7 +30,7 @@ pub fn file_name(text: &str) -> String {
     }
 }
 
-/// The same where one name is taken by something else.
+/// [`file_name`] that avoids a name that is already taken.
 #[must_use]
 pub fn file_name_except(text: &str, taken: &str) -> String {
     match file_name(text) {
@@ -39,7 +39,7 @@ pub fn file_name_except(text: &str, taken: &str) -> String {
     }
 }
 
-/// The same where some names are taken, also by the same text; the name is taken afterwards.
+/// [`file_name`] that avoids all taken names, even for the same text; adds the name to them.
 #[must_use]
 pub fn new_file_name(text: &str, taken: &mut BTreeSet<String>) -> String {
     let mut name = file_name(text);
@@ -72,8 +72,8 @@ fn hashed_file_name(text: &str) -> String {
     format!("{front}{trimmed}-{}", &hash[..HASH_DIGITS])
 }
 
-/// Whether a text can be its own name. What ends like a name with a hash cannot: it would be that
-/// of another text.
+/// Whether a text can be its own file name. A text that ends like a name with a hash cannot: it
+/// could be the name of another text.
 fn is_file_name(text: &str) -> bool {
     let plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b"-_.".contains(&b);
     let is_hash = |end: &str| {
@@ -103,10 +103,10 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Most letters and digits of a text that [`identifier`] keeps: C looks at 63 characters.
+/// Most letters and digits of a text that [`identifier`] keeps: C distinguishes 63 characters.
 const IDENTIFIER_MAX: usize = 24;
 
-/// What C and Rust have for themselves.
+/// Reserved words of C and Rust.
 const KEYWORDS: &str = "abstract alignas alignof as async auto await become bool box break case char \
     const constexpr continue crate default do double dyn else enum extern false final float fn for \
     gen goto if impl in inline int let long loop macro main match mod move mut nullptr override \
@@ -114,7 +114,7 @@ const KEYWORDS: &str = "abstract alignas alignof as async auto await become bool
     super switch thread_local trait true try type typedef typeof typeof_unqual union unsafe \
     unsigned unsized use virtual void volatile where while yield";
 
-/// A part of an identifier of C and Rust, from any text: its first ASCII letters and digits.
+/// Part of a C and Rust identifier, from any text: its first ASCII letters and digits.
 #[must_use]
 pub fn identifier(text: &str) -> String {
     let mut name = String::new();
@@ -129,10 +129,10 @@ pub fn identifier(text: &str) -> String {
     name.trim_end_matches('_').to_owned()
 }
 
-/// An identifier of C and Rust.
+/// Checks an identifier for C and Rust.
 ///
 /// # Errors
-/// What would be valid.
+/// A description of valid identifiers.
 pub fn checked_identifier(text: &str) -> Result<&str, &'static str> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let is_keyword = KEYWORDS.split_whitespace().any(|keyword| keyword == text);
@@ -144,14 +144,14 @@ pub fn checked_identifier(text: &str) -> Result<&str, &'static str> {
         Ok(text)
     } else {
         Err(
-            "expected an identifier of C and Rust: up to 63 letters, digits and _, a letter first, \
-             no keyword",
+            "expected a C and Rust identifier: up to 63 letters, digits and _, starting with a letter, \
+             and not a keyword",
         )
     }
 }
 
-/// Whether a character can neither be seen nor is an ordinary blank: controls, line ends, what
-/// changes the direction of writing, what has no width.
+/// Whether a character is neither visible nor an ordinary space: control characters, line ends,
+/// changes of writing direction, characters without width.
 #[must_use]
 pub fn is_hidden(c: char) -> bool {
     c.is_control()
@@ -163,19 +163,19 @@ pub fn is_hidden(c: char) -> bool {
             | '\u{1d173}'..='\u{1d17a}' | '\u{e0000}'..='\u{e0fff}')
 }
 
-/// Text as a terminal may show it, in one line: what [`is_hidden`] is written as `\n`, `\u{1b}`.
+/// Text for a terminal, on one line: [hidden](is_hidden) characters as `\n`, `\u{1b}`.
 #[must_use]
 pub fn terminal(text: &str) -> String {
     visible(text, "")
 }
 
-/// Text of several lines, likewise: line ends and tabs stay.
+/// Text for a terminal, on several lines: line ends and tabs are kept.
 #[must_use]
 pub fn terminal_lines(text: &str) -> String {
     visible(text, "\n\t")
 }
 
-/// A path as a terminal may show it; bytes that are no text are written as `\xff`.
+/// A path for a terminal; bytes that are not text as `\xff`.
 #[must_use]
 pub fn terminal_path(path: &Path) -> String {
     let mut shown = String::new();
@@ -200,7 +200,7 @@ fn visible(text: &str, but: &str) -> String {
     shown
 }
 
-/// The text as a terminal without UTF-8 can show it.
+/// Text for a terminal without UTF-8.
 #[must_use]
 pub fn ascii(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
@@ -247,7 +247,7 @@ pub fn ascii(text: &str) -> String {
     shown
 }
 
-/// Text as text in HTML, also between quotes.
+/// Text for HTML, also inside quotes.
 #[must_use]
 pub fn html(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -264,11 +264,11 @@ pub fn html(text: &str) -> String {
     escaped
 }
 
-/// Text as text in Markdown: in a paragraph, a list or the cell of a table.
+/// Text for Markdown: a paragraph, a list or a table cell.
 #[must_use]
 pub fn markdown(text: &str) -> String {
     let shown = terminal(text);
-    // Leading blanks can turn text into code, and no reader shows them.
+    // Leading spaces can turn text into code, and are not visible anyway.
     let shown = shown.trim_matches(' ');
     let mut escaped = String::with_capacity(shown.len());
     for (place, c) in shown.char_indices() {
@@ -298,7 +298,7 @@ pub fn markdown_code(text: &str) -> String {
     let shown = terminal(text);
     let runs = shown.split(|c| c != '`').map(str::len);
     let fence = "`".repeat(1 + runs.max().unwrap_or(0));
-    // One blank at each end is dropped by whoever reads it.
+    // Markdown drops one space at each end.
     let pad = if shown.is_empty() || shown.starts_with(['`', ' ']) || shown.ends_with(['`', ' ']) {
         " "
     } else {
@@ -307,20 +307,20 @@ pub fn markdown_code(text: &str) -> String {
     format!("{fence}{pad}{shown}{pad}{fence}")
 }
 
-/// Text as code in the cell of a Markdown table, where a bar ends the cell even in code.
+/// Text as code in a Markdown table cell, where a bar ends the cell even inside code.
 #[must_use]
 pub fn markdown_code_cell(text: &str) -> String {
     markdown_code(text).replace('|', r"\|")
 }
 
-/// What stands for itself in a part of a URL.
+/// Characters that are not escaped in a part of a URL.
 const IN_URL: &AsciiSet = &NON_ALPHANUMERIC
     .remove(b'-')
     .remove(b'.')
     .remove(b'_')
     .remove(b'~');
 
-/// A path as a URL: a relative path as a relative one.
+/// A path as a URL; a relative path gives a relative URL.
 #[must_use]
 pub fn url(path: &Path) -> String {
     let mut url = String::new();
@@ -339,11 +339,11 @@ pub fn url(path: &Path) -> String {
     url
 }
 
-/// What a path begins with where it is stored as text and is none: a URL.
+/// The start of a text that stands for a path as a URL.
 const FILE_URL: &str = "file://";
 
-/// A path as text that [`path_of_text`] makes the same path of: as it is, or, where it is not
-/// UTF-8, as a URL with the whole path.
+/// A path as text, for [`path_of_text`] to restore: unchanged, or if it is not UTF-8, as a URL of
+/// the absolute path.
 #[must_use]
 pub fn text_of_path(path: &Path) -> String {
     match path.to_str() {
@@ -355,7 +355,7 @@ pub fn text_of_path(path: &Path) -> String {
     }
 }
 
-/// The path that a text stands for.
+/// The path that [`text_of_path`] wrote as this text.
 #[must_use]
 pub fn path_of_text(text: &str) -> PathBuf {
     match text.strip_prefix(FILE_URL) {
@@ -374,8 +374,8 @@ fn os_string(bytes: Vec<u8>) -> OsString {
     String::from_utf8_lossy(&bytes).into_owned().into()
 }
 
-/// A word that a POSIX shell reads as this argument: printable, and of one line unless the word ends
-/// with a line end.
+/// A word that a POSIX shell reads as this argument: printable, and on one line unless it ends with
+/// a line end.
 #[must_use]
 pub fn shell_word(word: impl AsRef<OsStr>) -> String {
     let word = word.as_ref();
@@ -389,7 +389,7 @@ pub fn shell_word(word: impl AsRef<OsStr>) -> String {
     }
 }
 
-/// The word as what `printf` prints. A shell drops line ends at the end of that, so they stand behind.
+/// The word as output of `printf`. The shell drops line ends at the end of that, so they follow it.
 fn printf_word(word: &[u8]) -> String {
     let line_ends = word.iter().rev().take_while(|&&byte| byte == b'\n').count();
     let mut code = String::from("\"$(printf '");
@@ -416,7 +416,7 @@ fn octal(code: &mut String, bytes: &[u8]) {
     }
 }
 
-/// A path as a word for a shell; one that begins with a dash would be taken for a flag.
+/// A path as a shell word; one that starts with a dash would be taken for a flag.
 #[must_use]
 pub fn shell_path(path: &Path) -> String {
     if path.as_os_str().as_encoded_bytes().starts_with(b"-") {
@@ -426,30 +426,30 @@ pub fn shell_path(path: &Path) -> String {
     }
 }
 
-/// Bytes that are no text.
+/// Bytes that are not text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TextError {
-    /// It is text, in UTF-16.
+    /// Text in UTF-16.
     #[error("the text is in UTF-16; save it as UTF-8")]
     Utf16,
-    /// It is not UTF-8.
+    /// Not UTF-8.
     #[error("line {line}: byte {byte} of the file is not UTF-8; save it as UTF-8")]
     NotUtf8 {
-        /// The line, from 1.
+        /// The line number, from 1.
         line: usize,
-        /// The byte's place in the file, from 1.
+        /// The position of the byte in the file, from 1.
         byte: usize,
     },
 }
 
-/// The text of a text file, whatever program saved it: without a byte order mark, its lines ending
-/// with `\n`.
+/// The text of a text file, whichever program saved it: without a byte order mark, with lines
+/// ending in `\n`.
 ///
 /// # Errors
 /// [`TextError`] if it is not UTF-8.
 pub fn decode(bytes: &[u8]) -> Result<String, TextError> {
-    // A byte order mark, or ASCII with zeros between: no text that is read here begins otherwise.
+    // A byte order mark, or ASCII with zeros between: no UTF-8 text read here starts like this.
     if matches!(
         bytes,
         [0xff, 0xfe, ..]

@@ -1,7 +1,7 @@
-//! How long a run took, summed over all that worked on it one after the other.
+//! How long a run took, summed over all processes that worked on it.
 //!
-//! Written with every checkpoint, so that at most a generation's time is lost with a process. It is
-//! no part of a result, and no hash covers it.
+//! It is saved with every checkpoint, so that a killed process loses the time of at most one
+//! generation. It is not part of a result, and no hash covers it.
 
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::ranges;
@@ -14,21 +14,21 @@ use std::time::Instant;
 /// `time.json`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TimeSpent {
-    /// Seconds on the clock.
+    /// Wall-clock seconds.
     #[serde(deserialize_with = "ranges::seconds")]
     pub wall_s: f64,
-    /// Seconds of computing, all threads together.
+    /// CPU seconds, summed over all threads.
     #[serde(deserialize_with = "ranges::seconds")]
     pub cpu_s: f64,
-    /// How often it was begun or gone on with.
+    /// How often the run was started or resumed.
     pub sittings: u32,
 }
 
 impl TimeSpent {
-    /// What the file in a run directory says; a run of an older program has none.
+    /// Reads the file in a run directory; a run of an older program has none.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read or its numbers are not times.
+    /// [`FileError`] if it cannot be read or its numbers are not valid times.
     pub fn read(run: &Path) -> Result<Self, FileError> {
         let path = run.join(TIME);
         if !files::exists(&path)? {
@@ -38,7 +38,7 @@ impl TimeSpent {
         read.map_err(|error: serde_json::Error| FileError::at(&path)(error.into()))
     }
 
-    /// The file.
+    /// The contents of the file.
     #[must_use]
     pub fn json(&self) -> String {
         let rounded = Self {
@@ -62,7 +62,7 @@ impl TimeSpent {
     }
 }
 
-/// Counts the time of this sitting, on top of earlier ones.
+/// Adds the time of this process to that of earlier ones.
 #[derive(Clone, Debug)]
 pub struct Timer {
     before: TimeSpent,
@@ -71,7 +71,7 @@ pub struct Timer {
 }
 
 impl Timer {
-    /// Starts a sitting.
+    /// Starts measuring, after the time spent `before`.
     #[must_use]
     pub fn after(before: TimeSpent) -> Self {
         Self {
@@ -81,7 +81,7 @@ impl Timer {
         }
     }
 
-    /// Everything until now.
+    /// The time spent until now.
     #[must_use]
     pub fn spent(&self) -> TimeSpent {
         self.before.and(TimeSpent {
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sittings_are_summed_and_survive_their_file() {
+    fn times_are_summed_and_survive_a_round_trip_through_the_file() {
         let before = TimeSpent {
             wall_s: 2.5,
             cpu_s: 4.125,

@@ -1,9 +1,9 @@
-//! What the operating system says of time and memory.
+//! Time and memory use, from the operating system.
 
 #[cfg(not(unix))]
 use std::time::Instant;
 
-/// CPU time of this process since the start; elapsed time where the system does not tell.
+/// CPU time of this process since the start; elapsed time if the system does not report it.
 #[derive(Clone, Copy, Debug)]
 pub struct Stopwatch {
     #[cfg(unix)]
@@ -13,7 +13,7 @@ pub struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// Starts.
+    /// Starts measuring.
     #[must_use]
     pub fn start() -> Self {
         Self {
@@ -24,7 +24,7 @@ impl Stopwatch {
         }
     }
 
-    /// Seconds so far.
+    /// Seconds since the start.
     #[must_use]
     pub fn cpu_seconds(self) -> f64 {
         #[cfg(unix)]
@@ -38,7 +38,7 @@ impl Stopwatch {
     }
 }
 
-/// Largest memory of any child that has ended, in MB (10⁶ bytes).
+/// Largest memory of any child process that has ended, in MB (10⁶ bytes).
 #[must_use]
 pub fn children_peak_rss_mb() -> Option<f64> {
     #[cfg(unix)]

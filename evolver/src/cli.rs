@@ -1,4 +1,4 @@
-//! The command line: parse and hand over to a command.
+//! The command line: parses the arguments and calls a command.
 
 use crate::commands::bench::bench;
 use crate::commands::classify::classify;
@@ -23,7 +23,7 @@ use clap::{ColorChoice, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Evolves swarms of robots that minimise surprise, on the arithmetic that the robots run.
+/// Evolves swarms of robots that minimise surprise, with exactly the arithmetic of the robots.
 ///
 /// Without a command: `evolve` with the paper's parameters.
 #[derive(Debug, Parser)]
@@ -35,7 +35,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Evolve a swarm, and leave its genome and everything about the run in a directory.
+    /// Evolve a swarm; write its genome and the record of the run to a directory.
     Evolve(Box<EvolveArgs>),
     /// Measure how fast this program is on this machine; takes less than a minute.
     Bench {
@@ -43,7 +43,7 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Name what a swarm formed, show which robots belong to it, and measure the run.
+    /// Classify what a swarm formed, show which robots belong to it, and measure the run.
     Classify {
         /// A run directory, a final.json, an agent_trajectory, or a drawing of ▶ ▲ ◀ ▼ and ·.
         state: PathBuf,
@@ -51,42 +51,42 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Look at a run: in the terminal, or as a page or pictures.
+    /// Replay a run in the terminal, or write it as a page or pictures.
     Replay(Box<ReplayArgs>),
-    /// Write a page with the final state of every run, from which the replay of each opens.
+    /// Write a page with the final state of every run, linked to their replays.
     Gallery(GalleryArgs),
-    /// Evaluate a genome from new starts, on other grids, with other noise and swarm sizes.
+    /// Re-evaluate a genome from new starts, on other grids, with other noise and swarm sizes.
     Evaluate(EvaluateArgs),
-    /// Take a part of what a swarm formed away, or scatter it, and see what the swarm does.
+    /// Remove or reposition robots of a structure, and see how the swarm recovers.
     Damage(DamageArgs),
-    /// Write a run or a genome in the format of another program.
+    /// Export a run or a genome to the format of another program.
     Export(ExportArgs),
-    /// Put a genome onto the robot on a serial port, and start it.
+    /// Write a genome to the robot on a serial port, and start the robot.
     Flash(FlashArgs),
     /// Show what the robot on a serial port does, and how surprised it is, until Ctrl-C.
     Monitor(MonitorArgs),
-    /// Start the robot on a serial port, as it is.
+    /// Start the robot on a serial port with its current genome.
     Start(PortArgs),
     /// Stop the robot on a serial port.
     Stop(PortArgs),
-    /// Run a simulated swarm whose robot 0 is the robot on a serial port, and compare.
+    /// Hardware in the loop: simulate a swarm whose robot 0 is on a serial port, and compare.
     Hil(HilArgs),
-    /// Make genome files of the genome text of the program that the paper's authors published.
+    /// Import genome text of the program published by the paper's authors as genome files.
     Import(ImportArgs),
-    /// Show everything in a genome file.
+    /// Show the contents of a genome file.
     Inspect {
-        /// The genome file, or a run directory.
+        /// A genome file or a run directory.
         #[arg(value_name = "GENOME|RUN")]
         genome: PathBuf,
     },
-    /// The experiments of the paper: all its evolutions, one after the other or on a cluster.
+    /// Run the paper's experiments: all its evolutions, one after another or on a cluster.
     Paper {
         #[command(subcommand)]
         verb: Verb,
     },
-    /// The same for a suite of one's own, described in a TOML file.
+    /// Run your own suite of experiments, described in a TOML file.
     Suite(SuiteArgs),
-    /// Do a share of a suite's runs: what a task of a cluster, or of GNU parallel, does.
+    /// Do a share of a suite's runs: one task of a cluster or of GNU parallel.
     RunTask(TaskArgs),
     /// Print a completion script for a shell.
     Completions {
@@ -106,7 +106,7 @@ pub fn main() -> ExitCode {
     exit.into()
 }
 
-/// The arguments; ends the program where they are wrong, or ask for help.
+/// The arguments; exits if they are invalid or ask for help.
 fn arguments() -> Cli {
     let colours = match output::terminal_has_codes() {
         true => ColorChoice::Auto,

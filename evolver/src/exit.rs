@@ -1,24 +1,24 @@
-//! How the program ends; `docs/exit-codes.md` is the table for users.
+//! How the program ends; for users, see `docs/exit-codes.md`.
 
 use std::process::ExitCode;
 
 /// The exit codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
-    /// All that was asked is done.
+    /// Everything asked for is done.
     Done = 0,
-    /// Something broke: a file, a disk, a robot, a damaged run.
+    /// Something failed: a file, a disk, a robot, a damaged run.
     Failure = 1,
-    /// What was given cannot be used; nothing was written.
+    /// The input is invalid; nothing was written.
     BadInput = 2,
-    /// Not all that was asked is done; nothing is lost, and the command that was printed goes on.
+    /// Not everything asked for is done; nothing is lost, and the printed command continues.
     Unfinished = 3,
     /// Ended by Ctrl-C or another signal; nothing is lost.
     Interrupted = 130,
 }
 
 impl Exit {
-    /// Ends the program at once.
+    /// Exits the program at once.
     pub fn now(self) -> ! {
         std::process::exit(self as i32)
     }

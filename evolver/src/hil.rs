@@ -1,9 +1,10 @@
-//! A simulated swarm whose robot 0 may be elsewhere: a robot on a line, in the loop.
+//! Hardware in the loop: a simulated swarm whose robot 0 may be a real robot.
 //!
-//! Its hash is the SHA-256 of a fixed text; the number of robots in 64 bits; their starting poses;
-//! for every step, for every robot: its reading in 16 bits, action and turn in 8 bits each, its
-//! prediction in 16 bits, and its pose afterwards; and at the end robot 0's mispredicted and seen
-//! bits in 64 bits each. A pose is x and y in 16 bits each and the heading in 8. All little-endian.
+//! The hash of a run is the SHA-256 of a fixed text; the number of robots in 64 bits; their
+//! starting poses; for every step and every robot, its reading in 16 bits, action and turn in 8
+//! bits each, prediction in 16 bits, and pose after the step; and at the end, robot 0's
+//! mispredicted and seen bits in 64 bits each. A pose is x and y in 16 bits each and the heading
+//! in 8. All little-endian.
 
 use minimal_surprise_controller::{Controller, Decision, SensorBits, State, Surprise};
 use minimal_surprise_evolution::text::hex;
@@ -12,26 +13,26 @@ use minimal_surprise_sim::{Scenario, Trial, World, WorldError};
 use sha2::{Digest, Sha256};
 use std::fmt;
 
-/// What the hash starts with.
+/// The text at the start of the hash.
 const START: &[u8] = b"minimal surprise hil, version 1";
 
-/// All that a run depends on.
+/// Everything that a run depends on.
 #[derive(Clone, Debug)]
 pub struct Course {
-    /// What the swarm runs.
+    /// The robots' controller.
     pub controller: Controller,
     /// Grid, swarm size, steps, noise.
     pub scenario: Scenario,
-    /// Where it starts from, and the noise that it meets.
+    /// Starting poses and noise.
     pub trial: Trial,
 }
 
-/// What a run came to.
+/// The result of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ran {
-    /// Its hash.
+    /// The hash of the run.
     pub hash: HilHash,
-    /// What robot 0 decided, by step.
+    /// Robot 0's decision in every step.
     pub decisions: Vec<Decision>,
     /// Robot 0's surprise.
     pub surprise: Surprise,
@@ -47,19 +48,19 @@ impl fmt::Display for HilHash {
     }
 }
 
-/// A run with a robot elsewhere has ended too early.
+/// A run with a real robot ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum HilError<E> {
-    /// The swarm cannot stand like that.
+    /// The starting poses do not fit the grid.
     #[error(transparent)]
     World(WorldError),
-    /// The robot has not stepped.
+    /// The robot did not step.
     #[error(transparent)]
     Robot(E),
 }
 
 impl Course {
-    /// Runs it with all robots simulated.
+    /// Runs the swarm with all robots simulated.
     ///
     /// # Errors
     /// [`WorldError`] if the starting poses do not fit the grid.
@@ -75,7 +76,7 @@ impl Course {
         Ok(record.end(surprise.unwrap_or_default()))
     }
 
-    /// Runs it with robot 0 elsewhere: `step` gives it readings and brings its decision back.
+    /// Runs the swarm with a real robot 0: `step` sends it a reading and returns its decision.
     ///
     /// # Errors
     /// [`HilError`].
@@ -95,7 +96,7 @@ impl Course {
                     surprise = stepped.surprise;
                     stepped.decision
                 });
-                // The world wants a decision in any case; this step is then the last one.
+                // The world requires a decision even now; this step is the last.
                 let own = own.unwrap_or_else(|error| {
                     failed = Some(error);
                     Decision {
@@ -122,7 +123,7 @@ impl Course {
 }
 
 impl Ran {
-    /// The first step, counted from 1, in which robot 0 decided otherwise here than there.
+    /// The first step, counted from 1, in which robot 0's decisions differ.
     #[must_use]
     pub fn first_difference(&self, there: &Self) -> Option<usize> {
         let pairs = self.decisions.iter().zip(&there.decisions);
@@ -132,7 +133,7 @@ impl Ran {
     }
 }
 
-/// A run as it goes.
+/// A run in progress.
 struct Record {
     hash: Sha256,
     decisions: Vec<Decision>,

@@ -1,10 +1,10 @@
-//! The one way to standard output and standard error.
+//! All output to standard output and standard error.
 //!
-//! Whoever reads them may go away, and the disk behind them may be full. A report without a reader
-//! ends quietly: `evolver classify RUN | head` is no error. Work goes on to a place from which it
-//! can be resumed ([`event`]). What cannot be said on standard error is not said.
+//! The reader may close the pipe, and the disk may be full. A report without a reader ends quietly:
+//! `evolver classify RUN | head` is not an error. Work continues to a point from which it can be
+//! resumed ([`event`]). What cannot be written to standard error is dropped.
 //!
-//! Files and pipes get UTF-8; a terminal gets what its locale can show.
+//! Files and pipes get UTF-8; a terminal gets what its locale supports.
 
 use crate::exit::Exit;
 use crate::signals;
@@ -15,7 +15,7 @@ use std::fmt::Arguments;
 use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::sync::{LazyLock, OnceLock};
 
-/// Looked at once, at the start: a terminal that was closed is none any more.
+/// Checked once, at the start: a terminal that is closed later no longer counts as one.
 static STDOUT_IS_TERMINAL: LazyLock<bool> = LazyLock::new(|| stdout().is_terminal());
 static STDERR_IS_TERMINAL: LazyLock<bool> = LazyLock::new(|| stderr().is_terminal());
 static LOCALE_IS_UTF8: LazyLock<bool> = LazyLock::new(locale_is_utf8);
@@ -23,7 +23,7 @@ static LOCALE_IS_UTF8: LazyLock<bool> = LazyLock::new(locale_is_utf8);
 /// Why an event could not be written.
 static LOST: OnceLock<io::Error> = OnceLock::new();
 
-/// Looks at the terminals, and takes the colours away from those that have none.
+/// Inspects the terminals, and disables colours where they are not supported.
 pub(crate) fn start() {
     LazyLock::force(&STDOUT_IS_TERMINAL);
     LazyLock::force(&STDERR_IS_TERMINAL);
@@ -33,7 +33,7 @@ pub(crate) fn start() {
     }
 }
 
-/// Whether a terminal understands codes that move its cursor and change its colours.
+/// Whether a terminal supports codes that move the cursor and change colours.
 pub(crate) fn terminal_has_codes() -> bool {
     let named = |term: &std::ffi::OsString| !term.is_empty() && term != "dumb";
     cfg!(windows) || env::var_os("TERM").as_ref().is_some_and(named)
@@ -49,12 +49,12 @@ pub(crate) fn stderr_is_screen() -> bool {
     *STDERR_IS_TERMINAL && terminal_has_codes()
 }
 
-/// Whether standard output is a terminal whose locale knows ASCII only.
+/// Whether standard output is a terminal with an ASCII-only locale.
 pub(crate) fn stdout_is_ascii() -> bool {
     *STDOUT_IS_TERMINAL && !*LOCALE_IS_UTF8
 }
 
-/// Whether standard error is a terminal whose locale knows ASCII only.
+/// Whether standard error is a terminal with an ASCII-only locale.
 pub(crate) fn stderr_is_ascii() -> bool {
     *STDERR_IS_TERMINAL && !*LOCALE_IS_UTF8
 }
@@ -66,7 +66,7 @@ fn locale_is_utf8() -> bool {
     cfg!(windows) || locale.contains("utf-8") || locale.contains("utf8")
 }
 
-/// The text as standard error shows it.
+/// The text as standard error can show it.
 pub(crate) fn for_stderr(text: &str) -> Cow<'_, str> {
     if stderr_is_ascii() {
         ascii(text).into()
@@ -75,7 +75,7 @@ pub(crate) fn for_stderr(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// Writes to standard output. What to do about an error is for the caller to say.
+/// Writes to standard output. The caller handles the error.
 pub(crate) fn try_write(text: Arguments<'_>) -> io::Result<()> {
     let mut stdout = stdout();
     if stdout_is_ascii() {
@@ -91,15 +91,15 @@ pub(crate) fn write(text: Arguments<'_>) {
     check(try_write(text));
 }
 
-/// The same for bytes.
+/// Writes bytes to standard output.
 pub(crate) fn write_bytes(bytes: &[u8]) {
     let mut stdout = stdout();
     let written = stdout.write_all(bytes).and_then(|()| stdout.flush());
     check(written);
 }
 
-/// Ends the program if a report could not be written. One that nobody reads any more is dropped: the
-/// exit code still tells how it went.
+/// Exits if a report could not be written. A report whose reader is gone is dropped: the exit code
+/// still tells the result.
 pub(crate) fn check(written: io::Result<()>) {
     match written {
         Err(error) if !is_gone(&error) => {
@@ -110,29 +110,29 @@ pub(crate) fn check(written: io::Result<()>) {
     }
 }
 
-/// Writes to standard output while there is work to do. If that fails, the work is asked to stop
-/// where it can be resumed, and [`lost`] says why.
+/// Writes to standard output during work that takes long. If that fails, the work is asked to stop
+/// where it can be resumed, and [`lost`] returns the reason.
 pub(crate) fn event(text: Arguments<'_>) {
     if let Err(error) = try_write(text) {
-        // The first error is the one that counts.
+        // The first error is kept.
         let _ = LOST.set(error);
         signals::ask_to_stop();
     }
 }
 
-/// Why the work was asked to stop, if standard output is the reason.
+/// Why the work was asked to stop, if writing to standard output failed.
 pub(crate) fn lost() -> Option<&'static io::Error> {
     LOST.get()
 }
 
-/// Whether nobody reads standard output any more; a terminal fails in no other way.
+/// Whether the reader of standard output is gone; for a terminal, any error means that.
 pub(crate) fn is_gone(error: &io::Error) -> bool {
     error.kind() == ErrorKind::BrokenPipe || *STDOUT_IS_TERMINAL
 }
 
-/// Writes to standard error. Nobody could be told that it failed.
+/// Writes to standard error. Errors are ignored: there is nowhere to report them.
 pub(crate) fn tell(text: Arguments<'_>) {
-    // In one piece: other processes write there, too. Names and paths may hold anything.
+    // In one write, since other processes write there, too. Names and paths may contain anything.
     let text = terminal_lines(&text.to_string());
     let _ = stderr().write_all(for_stderr(&text).as_bytes());
 }
@@ -147,7 +147,7 @@ macro_rules! show_line {
     ($($text:tt)*) => { $crate::output::write(format_args!("{}\n", format_args!($($text)*))) };
 }
 
-/// Writes a line to standard output while there is work to do.
+/// Writes a line to standard output during work that takes long.
 macro_rules! show_event {
     ($($text:tt)*) => { $crate::output::event(format_args!("{}\n", format_args!($($text)*))) };
 }

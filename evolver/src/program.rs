@@ -1,9 +1,9 @@
-//! This program, as the runs that it makes name it.
+//! This program, as recorded in its runs.
 
 use minimal_surprise_evolution::run_files::Program;
 use minimal_surprise_evolution::text::shell_word;
 
-/// Name, version, revision, compiler, and how it was called.
+/// Name, version, revision, compiler, and command line.
 #[must_use]
 pub fn this_program() -> Program {
     let arguments = std::env::args_os();

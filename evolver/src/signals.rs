@@ -1,5 +1,5 @@
-//! Signals that ask for an end. Those that the caller ignores stay ignored: a run under `nohup`
-//! outlives its terminal, and Ctrl-C is not for a script's background jobs.
+//! Signals that request an end. Signals that the caller ignores stay ignored: a run under `nohup`
+//! outlives its terminal, and Ctrl-C does not reach a script's background jobs.
 
 use crate::exit::Exit;
 use signal_hook::{consts, flag};
@@ -9,20 +9,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Signals that ask for an end.
+/// Signals that request an end.
 #[cfg(unix)]
 const SIGNALS: [i32; 3] = [consts::SIGINT, consts::SIGTERM, consts::SIGHUP];
 #[cfg(not(unix))]
 const SIGNALS: [i32; 2] = [consts::SIGINT, consts::SIGTERM];
 
-/// How often it is checked whether one has come. Those that come together, as from a terminal and
-/// from its shell, count as one.
+/// How often signals are checked. Signals within this time, such as from a terminal and its shell,
+/// count as one.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Whether work is to stop where it can be resumed.
+/// Whether work should stop where it can be resumed.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// Whether work is to stop where it can be resumed.
+/// Whether work should stop where it can be resumed.
 #[must_use]
 pub fn stop() -> &'static AtomicBool {
     &STOP
@@ -33,7 +33,7 @@ pub fn ask_to_stop() {
     STOP.store(true, Ordering::Relaxed);
 }
 
-/// Waits until then, or until work is to stop.
+/// Waits until this moment, or until work should stop.
 pub fn wait_until(moment: Instant) {
     loop {
         let left = moment.saturating_duration_since(Instant::now());
@@ -44,20 +44,20 @@ pub fn wait_until(moment: Instant) {
     }
 }
 
-/// The first signal asks work to stop after this generation, the second ends it at once; both leave
-/// what can be resumed.
+/// The first signal asks work to stop after this generation, the second exits at once; either way
+/// the run can be resumed.
 ///
 /// # Errors
-/// If the operating system does not hand signals over.
+/// If the operating system does not deliver signals.
 pub fn stop_on_signal() -> io::Result<&'static AtomicBool> {
     ask_then_end("ending after this generation", || {})?;
     Ok(stop())
 }
 
-/// The first signal asks work to stop and says so, the second calls `last` and ends the program.
+/// The first signal asks work to stop and prints `words`, the second calls `last` and exits.
 ///
 /// # Errors
-/// If the operating system does not hand signals over.
+/// If the operating system does not deliver signals.
 pub fn ask_then_end(words: &'static str, last: impl Fn() + Send + 'static) -> io::Result<()> {
     let mut asked = false;
     on_signal(move || {
@@ -67,14 +67,14 @@ pub fn ask_then_end(words: &'static str, last: impl Fn() + Send + 'static) -> io
         }
         asked = true;
         ask_to_stop();
-        tell!("\n{words}; Ctrl-C again ends at once");
+        tell!("\n{words}; press Ctrl-C again to end at once");
     })
 }
 
-/// Calls `handle`, on a thread of its own, whenever a signal asks for an end.
+/// Calls `handle` on a separate thread for every signal that requests an end.
 ///
 /// # Errors
-/// If the operating system does not hand signals over.
+/// If the operating system does not deliver signals.
 pub fn on_signal(mut handle: impl FnMut() + Send + 'static) -> io::Result<()> {
     let came = Arc::new(AtomicBool::new(false));
     let ignored = ignored();
@@ -96,7 +96,7 @@ pub fn on_signal(mut handle: impl FnMut() + Send + 'static) -> io::Result<()> {
 }
 
 /// The signals that this process ignores, bit n − 1 for signal n; none where the system has no file
-/// that says so.
+/// that lists them.
 fn ignored() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

@@ -1,4 +1,4 @@
-"""Prints the outlines of a TrueType font's letters: a line a letter, code point in hexadecimal,
+"""Prints the outlines of a TrueType font's characters, one line each: code point in hexadecimal,
 advance and path data in font units, y upwards. The first line has the units per em.
 """
 

@@ -1,7 +1,4 @@
-//! Replays: looking at a run, in the terminal, on a page, in pictures.
-//!
-//! [`recording`] is what there is to see, made of the files that a run leaves behind; [`scene`] is
-//! one state of it to draw, in the colours of [`palette`]; everything else here draws scenes.
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "gallery")]

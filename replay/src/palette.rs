@@ -1,41 +1,41 @@
-//! Colours and outlines, the same in every picture: told apart by the colour-blind, and by shape
-//! where colour is not enough. The hues are Okabe and Ito's.
+//! Colours and outlines, the same in every picture. Colour-blind readers can tell the hues (Okabe
+//! and Ito's) apart; where colour is not enough, shapes differ.
 
 use super::scene::{Ink, Mark};
 use serde::Serialize;
 
-/// Colours on light or on dark ground.
+/// Colours on a light or dark background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Theme {
-    /// Behind everything.
+    /// The background.
     pub ground: &'static str,
     /// An empty cell.
     pub cell: &'static str,
     /// Lines between cells.
     pub line: &'static str,
-    /// Words.
+    /// Text.
     pub text: &'static str,
-    /// Words that matter less, and axes.
+    /// Secondary text, and axes.
     pub soft: &'static str,
     /// Robots of [`Ink::Plain`].
     pub plain: &'static str,
-    /// Robots of the named structure.
+    /// Robots of the dominant structure.
     pub named: &'static str,
     /// Robots of another structure.
     pub other: &'static str,
-    /// Robots of no structure; only their outline is drawn.
+    /// Robots of no structure; drawn as outlines.
     pub outside: &'static str,
     /// Robots by surprise, from none to most.
     pub surprise: [&'static str; 4],
-    /// What was predicted right.
+    /// Correct predictions.
     pub hit: &'static str,
-    /// What was mispredicted.
+    /// Mispredictions.
     pub miss: &'static str,
-    /// What is yet to be sensed, and the area that was damaged.
+    /// Predictions not yet sensed, and the damaged area.
     pub expects: &'static str,
 }
 
-/// On light ground.
+/// For a light background.
 pub const LIGHT: Theme = Theme {
     ground: "#ffffff",
     cell: "#f4f4f2",
@@ -52,7 +52,7 @@ pub const LIGHT: Theme = Theme {
     expects: "#8a5aa8",
 };
 
-/// On dark ground.
+/// For a dark background.
 pub const DARK: Theme = Theme {
     ground: "#161615",
     cell: "#20201f",
@@ -69,8 +69,7 @@ pub const DARK: Theme = Theme {
     expects: "#cc9ee0",
 };
 
-/// The outline of a robot that faces east, in a cell from (0, 0), north-west, to (1, 1): an arrow
-/// head.
+/// The outline of a robot facing east: an arrowhead in a cell from (0, 0), north-west, to (1, 1).
 pub const ARROW: [[f64; 2]; 4] = [[0.88, 0.5], [0.16, 0.84], [0.32, 0.5], [0.16, 0.16]];
 
 impl Theme {
@@ -86,8 +85,8 @@ impl Theme {
         }
     }
 
-    /// The colour of a mark. Hits are drawn as squares, misses as crosses, what is expected as
-    /// rings; where a robot was sensed (or is expected) they are filled (thick), else hollow (thin).
+    /// The colour of a mark. Hits are squares, misses are crosses, expectations are rings; filled
+    /// or thick where a robot was sensed or is expected, else hollow or thin.
     #[must_use]
     pub fn mark(&self, mark: Mark) -> &'static str {
         match mark {
@@ -98,7 +97,7 @@ impl Theme {
     }
 }
 
-/// Whether only the outline of a robot is drawn.
+/// Whether a robot is drawn as an outline only.
 #[must_use]
 pub fn is_hollow(ink: Ink) -> bool {
     matches!(ink, Ink::Outside | Ink::Surprise(0))

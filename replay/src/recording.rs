@@ -1,8 +1,8 @@
-//! What there is to see of a run: every state, and what the robots sensed, did and expected.
+//! A recorded run: every state, and what the robots sensed, did and predicted.
 //!
 //! State `t` is the swarm after `t` steps, `t` = 0 to T. In step `t`, from state `t` to `t + 1`,
-//! every robot takes a reading, which its prediction of the step before is compared with, then
-//! acts and predicts the next reading.
+//! every robot takes a reading, compares it with its prediction from the previous step, acts, and
+//! predicts the next reading.
 
 use minimal_surprise_controller::{Controller, Genome, SensorBits, State, Topology};
 use minimal_surprise_evolution::finished_run::FinishedRun;
@@ -17,36 +17,36 @@ use minimal_surprise_sim::structures::{Membership, Structure, classify};
 use minimal_surprise_sim::{Area, Grid, Pose, Scenario, Trace, TraceStep, Trial, WorldError};
 use rayon::prelude::*;
 
-/// A run to look at.
+/// A run to show.
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// The torus.
     pub grid: Grid,
-    /// Every step, and the final poses. A trajectory has no readings and no decisions.
+    /// Every step, and the final poses. A trajectory has neither readings nor decisions.
     pub trace: Trace,
-    /// What the robots are; nothing is known of those of a trajectory.
-    pub minds: Option<Minds>,
-    /// For every state and robot, the structures that it belongs to.
+    /// Sensors, predictions and fitness; `None` for a trajectory.
+    pub controller: Option<ControllerData>,
+    /// The structures that each robot belongs to, by state and robot.
     pub members: Vec<Vec<Membership>>,
-    /// The structures that the run is named after, those of its final state, or of the state before
-    /// it was damaged; several if tied.
+    /// The run's dominant structures: those of its final state or, if it was damaged, of the state
+    /// before the damage; several if tied.
     pub names: Vec<Structure>,
     /// Temperature of every step, 0 to 1 (paper, Eqs. 2–3).
     pub temperature: Vec<f64>,
-    /// The hash of the steps, made from this recording.
+    /// The hash of the steps, computed from this recording.
     pub steps_hash: Option<StepsHash>,
-    /// Where it comes from.
+    /// Where the recording comes from.
     pub origin: Origin,
 }
 
-/// What robots sense with and expect.
+/// Sensors, predictions and fitness of the robots in a run.
 #[derive(Clone, Debug)]
-pub struct Minds {
+pub struct ControllerData {
     /// Sensor model and fixed predictions.
     pub topology: Topology,
-    /// What every robot's first reading is compared with.
+    /// The prediction that every robot's first reading is compared with.
     pub first_prediction: SensorBits,
-    /// What flips readings.
+    /// The sensor noise.
     pub noise: NoiseStream,
     /// Fitness after every step, 0 to 1 (paper, Eq. 1, over the steps so far).
     pub fitness: Vec<f64>,
@@ -57,33 +57,33 @@ pub struct Minds {
 /// Where a recording comes from.
 #[derive(Clone, Debug, Default)]
 pub struct Origin {
-    /// Its name: a file or directory as the user gave it.
+    /// Name: a file or directory as the user gave it.
     pub name: String,
     /// Seed of the evolution.
     pub seed: Option<u64>,
     /// Hash of the evolution.
     pub run_hash: Option<String>,
-    /// The hash of the steps that the run recorded, for comparison.
+    /// The hash of the steps that the run recorded, to compare with.
     pub steps_hash: Option<RecordedHash>,
     /// Sensor noise: the probability that a bit is flipped.
     pub noise: f64,
-    /// Best fitness of every generation of the evolution; empty if it is not known.
+    /// Best fitness of every generation; empty if unknown.
     pub evolution: Vec<f64>,
-    /// If the swarm was damaged at the start: where, and how it stood before.
+    /// The damage, if the swarm was damaged before the first step.
     pub damage: Option<Damaged>,
 }
 
 /// A swarm that was damaged before the first step.
 #[derive(Clone, Debug)]
 pub struct Damaged {
-    /// What was done, and where.
+    /// The kind of damage and its area.
     pub damage: Damage,
     /// Poses before the damage.
     pub before: Vec<Pose>,
 }
 
 impl Recording {
-    /// The final run of an evolution.
+    /// Records the final run of an evolution.
     ///
     /// # Errors
     /// [`WorldError`] if the starting poses do not fit the grid.
@@ -106,7 +106,7 @@ impl Recording {
         )
     }
 
-    /// The final state of an evolution damaged, and what becomes of it.
+    /// Damages the final state of an evolution, and records how the swarm continues.
     ///
     /// # Errors
     /// [`DamageError`] if nothing is left to run.
@@ -129,7 +129,7 @@ impl Recording {
         Ok(Self { names, ..recording })
     }
 
-    /// A genome under some conditions.
+    /// Records a run of a genome under the given conditions.
     ///
     /// # Errors
     /// [`WorldError`] if the starting poses do not fit the grid.
@@ -159,7 +159,7 @@ impl Recording {
             measures.observe(world);
             fitness.push(measures.fitness());
         })?;
-        let minds = Minds {
+        let controller = ControllerData {
             topology,
             noise: trial.noise.clone(),
             first_prediction: State::new(&controller).prediction(),
@@ -169,13 +169,13 @@ impl Recording {
         let temperature = measures.temperature();
         let recording = Self::of_trace(grid, trace, temperature, origin)?;
         Ok(Self {
-            minds: Some(minds),
+            controller: Some(controller),
             steps_hash: Some(hash),
             ..recording
         })
     }
 
-    /// Poses only, from another program.
+    /// Records the poses of another program's trajectory.
     ///
     /// # Errors
     /// [`WorldError`] if poses do not fit the grid.
@@ -222,7 +222,7 @@ impl Recording {
             names: classify(grid, &trace.final_poses)?.names(),
             grid,
             trace,
-            minds: None,
+            controller: None,
             members,
             temperature,
             steps_hash: None,
@@ -230,7 +230,7 @@ impl Recording {
         })
     }
 
-    /// Number of steps, T; there is one state more.
+    /// Number of steps, T; there are T + 1 states.
     #[must_use]
     pub fn steps(&self) -> usize {
         self.trace.steps.len()
@@ -242,7 +242,7 @@ impl Recording {
         self.trace.final_poses.len()
     }
 
-    /// Poses of state `t`; the final ones beyond the last.
+    /// Poses of state `t`; beyond the last state, the final poses.
     #[must_use]
     pub fn poses(&self, t: usize) -> &[Pose] {
         self.trace
@@ -251,17 +251,17 @@ impl Recording {
             .map_or(&self.trace.final_poses, |step| &step.poses)
     }
 
-    /// What a robot sensed in step `t`, noise included; none in the last state and of a trajectory.
+    /// A robot's reading in step `t` with noise; `None` in the last state and for a trajectory.
     #[must_use]
     pub fn sensed(&self, t: usize, robot: usize) -> Option<SensorBits> {
         self.trace.steps.get(t)?.readings.get(robot).copied()
     }
 
-    /// What a robot expects to sense in state `t`; none of a trajectory.
+    /// A robot's prediction for state `t`; `None` for a trajectory.
     #[must_use]
     pub fn predicted(&self, t: usize, robot: usize) -> Option<SensorBits> {
         match t.checked_sub(1) {
-            None => self.minds.as_ref().map(|minds| minds.first_prediction),
+            None => self.controller.as_ref().map(|data| data.first_prediction),
             Some(before) => {
                 let step = self.trace.steps.get(before)?;
                 step.decisions.get(robot).map(|d| d.prediction)
@@ -276,14 +276,13 @@ impl Recording {
         members.is_some_and(|members| members.contains(structure))
     }
 
-    /// The structure that the run is named after, of tied ones the first in the paper's
-    /// order.
+    /// The run's dominant structure; of tied ones, the first in the paper's order.
     #[must_use]
     pub fn name(&self) -> Option<Structure> {
         self.names.first().copied()
     }
 
-    /// Robots in the structure that the run is named after, in state `t`.
+    /// Number of robots in the run's dominant structure in state `t`.
     #[must_use]
     pub fn in_structure(&self, t: usize) -> usize {
         self.name().map_or(0, |name| {
@@ -294,7 +293,7 @@ impl Recording {
         })
     }
 
-    /// The area that was damaged.
+    /// The damaged area.
     #[must_use]
     pub fn damaged_area(&self) -> Option<Area> {
         self.origin.damage.as_ref().map(|damaged| {

@@ -1,6 +1,6 @@
-//! One state of a run as something to draw: which robots stand where, in which ink, and what is
-//! marked on the cells. Every back end draws scenes and knows nothing else of a run; the page has
-//! this file's rules once more in its script, and a test compares the two.
+//! One state of a run, ready to draw: where the robots are, in which ink, and which cells are
+//! marked. Back ends draw scenes and know nothing else about a run. The page's script repeats the
+//! rules of this file; a test compares the two.
 
 use super::recording::Recording;
 use minimal_surprise_controller::SensorBits;
@@ -8,12 +8,12 @@ use minimal_surprise_sim::structures::classify;
 use minimal_surprise_sim::{Pose, Structure};
 use serde::Serialize;
 
-/// What the colours of robots say.
+/// What the colours of robots show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Colouring {
-    /// Whether a robot belongs to the structure that the run is named after, or to another one.
+    /// Whether a robot belongs to the run's dominant structure, another one, or none.
     #[default]
     Structure,
     /// How many of its sensors a robot mispredicted.
@@ -25,17 +25,17 @@ pub enum Colouring {
 /// A state to draw.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Scene {
-    /// Cells in a row.
+    /// Cells per row.
     pub width: u16,
     /// Rows.
     pub height: u16,
     /// The robots, in index order.
     pub robots: Vec<Robot>,
-    /// What is marked on cells: the sensor cells of the robot that is looked into.
+    /// Marked cells: the sensor cells of the selected robot.
     pub marks: Vec<MarkedCell>,
-    /// Cells of the area that was damaged.
+    /// Cells of the damaged area.
     pub area: Vec<[u16; 2]>,
-    /// The robot that is looked into.
+    /// The selected robot.
     pub picked: Option<usize>,
 }
 
@@ -52,19 +52,19 @@ pub struct Robot {
     pub ink: Ink,
 }
 
-/// What a robot's colour and shape say.
+/// What a robot's colour and shape show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ink {
     /// Nothing.
     Plain,
-    /// It belongs to the structure that the run is named after.
+    /// It belongs to the run's dominant structure.
     Named,
     /// It belongs to another structure.
     Other,
     /// It belongs to none: drawn hollow.
     Outside,
-    /// It mispredicted so few of its sensors: none; up to an eighth; up to a quarter; more.
+    /// It mispredicted none (0), up to 1/8 (1), up to 1/4 (2) or more (3) of its sensors.
     Surprise(u8),
 }
 
@@ -75,11 +75,11 @@ pub struct MarkedCell {
     pub x: u16,
     /// Cells from the south edge.
     pub y: u16,
-    /// What was sensed and predicted there.
+    /// What the robot sensed and predicted there.
     pub mark: Mark,
 }
 
-/// What a robot sensed and predicted of a cell.
+/// What a robot sensed and predicted in a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mark {
@@ -91,9 +91,9 @@ pub enum Mark {
     MissOccupied,
     /// Sensed none and had predicted one.
     MissEmpty,
-    /// Predicts a robot; the run ends before it looks.
+    /// Predicts a robot; the run ends before it senses.
     ExpectsOccupied,
-    /// Predicts none; the run ends before it looks.
+    /// Predicts none; the run ends before it senses.
     ExpectsEmpty,
 }
 
@@ -125,8 +125,8 @@ impl Scene {
         }
     }
 
-    /// A swarm of which only the poses are known, as before damage. Its robots are coloured by
-    /// structure if they are at all.
+    /// A swarm of which only poses are known, such as before damage. Its robots are coloured by
+    /// structure or not at all.
     #[must_use]
     pub fn of_poses(recording: &Recording, poses: &[Pose], colouring: Colouring) -> Self {
         let members = match colouring {
@@ -178,9 +178,9 @@ fn ink_of_member(is_member: impl Fn(Structure) -> bool, name: Option<Structure>)
     }
 }
 
-/// How surprised a robot is in state `t`, in four levels; none where nothing was sensed.
+/// How surprised a robot is in state `t`, in four levels; `None` where nothing was sensed.
 fn surprise(recording: &Recording, t: usize, robot: usize) -> Option<u8> {
-    let sensors = recording.minds.as_ref()?.topology.sensors() as u32;
+    let sensors = recording.controller.as_ref()?.topology.sensors() as u32;
     let sensed = recording.sensed(t, robot)?;
     let missed = sensed.differing(recording.predicted(t, robot)?);
     Some(match missed {
@@ -192,12 +192,13 @@ fn surprise(recording: &Recording, t: usize, robot: usize) -> Option<u8> {
 }
 
 fn marks(recording: &Recording, t: usize, robot: usize) -> Vec<MarkedCell> {
-    let (Some(minds), Some(&pose)) = (&recording.minds, recording.poses(t).get(robot)) else {
+    let (Some(controller), Some(&pose)) = (&recording.controller, recording.poses(t).get(robot))
+    else {
         return Vec::new();
     };
     let sensed = recording.sensed(t, robot);
     let predicted = recording.predicted(t, robot).unwrap_or(SensorBits::NONE);
-    let cells = minds.topology.model().cells().iter().enumerate();
+    let cells = controller.topology.model().cells().iter().enumerate();
     cells
         .map(|(sensor, &cell)| {
             let (dx, dy) = pose.heading.offset(cell);

@@ -1,4 +1,4 @@
-//! Files: read with a bound, and never half-written.
+//! Files: read up to a size limit, and never left half-written.
 
 #[cfg(feature = "files")]
 mod write;
@@ -17,31 +17,31 @@ use std::path::{Path, PathBuf};
 pub struct FileError {
     /// The file or folder.
     pub path: PathBuf,
-    /// Why.
+    /// The cause.
     pub error: io::Error,
 }
 
 impl FileError {
-    /// Says which path an error is about.
+    /// Adds the path to an I/O error.
     pub fn at(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |error| Self { path, error }
     }
 
-    /// There is something already.
+    /// The error for a path that exists.
     #[must_use]
     pub fn exists(path: &Path) -> Self {
-        let error = io::Error::new(ErrorKind::AlreadyExists, "it exists already");
+        let error = io::Error::new(ErrorKind::AlreadyExists, "it already exists");
         Self::at(path)(error)
     }
 
-    /// Whether nothing was written because there is something already.
+    /// Whether nothing was written because the path exists.
     #[must_use]
     pub fn is_exists(&self) -> bool {
         self.error.kind() == ErrorKind::AlreadyExists
     }
 
-    /// Whether another path would do, as opposed to something that broke.
+    /// Whether another path would work, as opposed to a failure of the system.
     #[must_use]
     pub fn is_bad_path(&self) -> bool {
         use ErrorKind as Kind;
@@ -61,17 +61,17 @@ impl FileError {
     }
 }
 
-/// What to do where there is something already.
+/// What to do if a path exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Existing {
     /// Write nothing.
     Refuse,
-    /// Replace a file; in a folder, files of the same names.
+    /// Replace a file, or files with the same names in a folder.
     Replace,
 }
 
 impl Existing {
-    /// As the flag `--overwrite` says.
+    /// From the flag `--overwrite`.
     #[must_use]
     pub fn with_overwrite(overwrite: bool) -> Self {
         if overwrite {
@@ -82,7 +82,7 @@ impl Existing {
     }
 }
 
-/// The directory that a path is in.
+/// The directory that contains a path.
 #[must_use]
 pub fn parent(path: &Path) -> &Path {
     match path.parent() {
@@ -91,53 +91,53 @@ pub fn parent(path: &Path) -> &Path {
     }
 }
 
-/// Whether there is something of this name, symbolic links followed.
+/// Whether a path exists, following symbolic links.
 ///
 /// # Errors
-/// [`FileError`] if that cannot be known, as where a folder must not be looked into.
+/// [`FileError`] if that cannot be determined, for example without permission to read the folder.
 pub fn exists(path: &Path) -> Result<bool, FileError> {
     path.try_exists().map_err(FileError::at(path))
 }
 
-/// Most bytes of a file that a person writes, or that says a few things about a run: settings,
-/// suites, notes, `meta.json`, `time.json`, `DONE`.
+/// Size limit for files that people write or that describe a run: settings, suites, notes,
+/// `meta.json`, `time.json`, `DONE`.
 pub const TEXT_BYTES_MAX: u64 = 16 << 20;
 
-/// Most bytes of a file of poses, genomes or generations whose size no settings tell.
+/// Size limit for files of poses, genomes or generations whose size does not follow from settings.
 pub const DATA_BYTES_MAX: u64 = 256 << 20;
 
-/// A file is larger than what it should hold can be.
+/// A file is larger than its contents can be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TooLarge {
-    /// The file says so.
+    /// Its size is too large.
     #[error("it has {found} bytes; at most {most} are read")]
     Sized {
         /// Its size.
         found: u64,
-        /// The most that is read.
+        /// The size limit.
         most: u64,
     },
-    /// It is no plain file, has no size, and does not end in time.
-    #[error("it does not end after {most} bytes, the most that are read")]
+    /// It has no size, such as a pipe, and does not end within the limit.
+    #[error("it does not end within {most} bytes; no more are read")]
     Endless {
-        /// The most that is read.
+        /// The size limit.
         most: u64,
     },
 }
 
-/// Reads a whole file of at most `most` bytes. The size is looked at first, so that no memory is
-/// spent on a larger one; of what has no size no more is read than that.
+/// Reads a whole file of at most `most` bytes. The size is checked first, so that no memory is
+/// spent on a larger file; from a file without a size, no more than the limit is read.
 ///
 /// # Errors
-/// [`FileError`] names it; the cause is [`TooLarge`] if there is more.
+/// [`FileError`] names the file; its cause is [`TooLarge`] if the file exceeds the limit.
 pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
     let too_large = |error: TooLarge| io::Error::new(io::ErrorKind::FileTooLarge, error);
     let read = || {
         let file = File::open(path)?;
         let metadata = file.metadata()?;
         let found = metadata.len();
-        // That a directory is in its place is said by reading.
+        // If it is a directory, reading reports that.
         if found > most && !metadata.is_dir() {
             return Err(too_large(TooLarge::Sized { found, most }));
         }
@@ -151,11 +151,11 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
     read().map_err(FileError::at(path))
 }
 
-/// Reads a whole text file of at most `most` bytes, whatever program saved it: see
+/// Reads a whole text file of at most `most` bytes, whichever program saved it; see
 /// [`text::decode`].
 ///
 /// # Errors
-/// [`FileError`] names it.
+/// [`FileError`] names the file.
 pub fn read_text(path: &Path, most: u64) -> Result<String, FileError> {
     text::decode(&read(path, most)?)
         .map_err(|error| FileError::at(path)(io::Error::new(io::ErrorKind::InvalidData, error)))

@@ -1,4 +1,4 @@
-//! Files that are never half-written: written beside, synced, then renamed.
+//! Files that are never half-written: written under a temporary name, synced, then renamed.
 
 use super::{Existing, FileError, parent};
 use sha2::{Digest, Sha256};
@@ -9,12 +9,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempPath;
 
-/// What names of temporary files and directories end with.
+/// The ending of temporary files and directories.
 const PART: &str = ".part";
 
-/// A name beside a path, for what is to be renamed to it: a hash of the final name, and a random
-/// number, because process ids are the same on two machines that share a file system. It has the
-/// same length for every name.
+/// A temporary name in the same folder, of fixed length: a hash of the final name, and a random
+/// number, because process ids can be the same on two machines that share a file system.
 #[must_use]
 pub fn beside(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default();
@@ -24,7 +23,7 @@ pub fn beside(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{hash:016x}.{number:016x}{PART}"))
 }
 
-/// Whether a name is one of [`beside`], so that nobody is meant to look inside.
+/// Whether a name is a temporary one from [`beside`].
 #[must_use]
 pub fn is_part(name: &OsStr) -> bool {
     let numbers = || {
@@ -36,10 +35,10 @@ pub fn is_part(name: &OsStr) -> bool {
     numbers().is_some_and(|(hash, number)| is_number(hash) && is_number(number))
 }
 
-/// Nobody takes so long to write a file.
+/// No write takes longer than this.
 const PART_AGE_MAX: Duration = Duration::from_secs(3600);
 
-/// Removes what processes left in a folder that were killed while they wrote a file in it.
+/// Removes the temporary files that killed processes left in a folder.
 pub fn remove_old_parts(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let is_old = |metadata: fs::Metadata| {
@@ -53,7 +52,7 @@ pub fn remove_old_parts(folder: &Path) {
     }
 }
 
-/// Writes a file as [`Existing`] says.
+/// Writes a file, replacing an existing one only if `existing` allows it.
 ///
 /// # Errors
 /// As [`create`] and [`replace`].
@@ -64,12 +63,12 @@ pub fn write(path: &Path, contents: &[u8], existing: Existing) -> Result<(), Fil
     }
 }
 
-/// Writes a file that must not exist yet. Under its name it is complete from the first moment, and
-/// it replaces nothing, even what has just appeared. On a file system that has neither hard links
-/// nor a rename that replaces nothing, an empty file reserves the name for the moment before.
+/// Writes a file that must not exist yet. It appears under its name complete, and replaces nothing,
+/// not even a file created in the meantime. On a file system with neither hard links nor a rename
+/// that refuses to replace, an empty file briefly reserves the name.
 ///
 /// # Errors
-/// [`FileError`] if it exists ([`FileError::is_exists`]) or cannot be written; nothing is left then.
+/// [`FileError`] if it exists ([`FileError::is_exists`]) or cannot be written; nothing is left.
 pub fn create(path: &Path, contents: &[u8]) -> Result<(), FileError> {
     if path.symlink_metadata().is_ok() {
         return Err(FileError::exists(path));
@@ -84,7 +83,7 @@ pub fn create(path: &Path, contents: &[u8]) -> Result<(), FileError> {
         };
         File::create_new(path)?;
         refused.path.persist(path).map_err(|refused| {
-            // It is empty and ours; the error that matters is the first.
+            // The file is empty and ours; the first error is the one to report.
             let _ = fs::remove_file(path);
             refused.error
         })
@@ -92,12 +91,12 @@ pub fn create(path: &Path, contents: &[u8]) -> Result<(), FileError> {
     create().map_err(FileError::at(path))
 }
 
-/// Replaces a file as a whole: after a kill at any moment there is the old one or the new one, with
-/// the permissions of the old one. A symbolic link stays, and what it points to is replaced. What
-/// cannot be replaced is written to instead: a device, a pipe, a file that is mounted.
+/// Replaces a file as a whole: if the process is killed, either the old or the new file exists. The
+/// new one gets the permissions of the old one. A symbolic link is kept, and its target replaced.
+/// What cannot be replaced (a device, a pipe, a mounted file) is written to instead.
 ///
 /// # Errors
-/// [`FileError`] if it cannot be written; the old file is then still there.
+/// [`FileError`] if it cannot be written; the old file is then unchanged.
 pub fn replace(path: &Path, contents: &[u8]) -> Result<(), FileError> {
     let replace = || {
         let old = fs::metadata(path).ok();
@@ -110,7 +109,7 @@ pub fn replace(path: &Path, contents: &[u8]) -> Result<(), FileError> {
         let written = write_beside(&target, contents, permissions)
             .and_then(|part| part.persist(&target).map_err(|refused| refused.error));
         match written.as_ref().map_err(io::Error::kind) {
-            // A mount point cannot be renamed to, and what it is mounted in may be read-only.
+            // A mount point cannot be a rename's target, and its folder may be read-only.
             Err(ErrorKind::ResourceBusy | ErrorKind::ReadOnlyFilesystem) if is_file => {
                 write_to(&target, contents)
             }
@@ -120,7 +119,7 @@ pub fn replace(path: &Path, contents: &[u8]) -> Result<(), FileError> {
     replace().map_err(FileError::at(path))
 }
 
-/// Writes a new file beside a path, which goes again unless it is renamed.
+/// Writes a temporary file beside a path; it is removed unless it is renamed.
 fn write_beside(
     path: &Path,
     contents: &[u8],
@@ -139,23 +138,23 @@ fn write_beside(
     Ok(part)
 }
 
-/// Writes to what is there.
+/// Writes to an existing device, pipe or file.
 fn write_to(path: &Path, contents: &[u8]) -> io::Result<()> {
     let mut file = File::options().write(true).truncate(true).open(path)?;
     file.write_all(contents)
 }
 
-/// What symbolic links at the end of a path lead to, whether it exists or not.
+/// The target of a chain of symbolic links, whether it exists or not.
 fn target(path: &Path) -> io::Result<PathBuf> {
     let mut target = path.to_owned();
-    // As many as Linux follows.
+    // As many links as Linux follows.
     for _ in 0..40 {
         match fs::read_link(&target) {
             Ok(next) => target = parent(&target).join(next),
             Err(_) => return Ok(target),
         }
     }
-    // A loop, which says so itself.
+    // A loop: using it reports the error.
     fs::metadata(path).map(|_| target)
 }
 
@@ -169,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn only_names_that_this_program_gives_are_those_of_parts() {
+    fn only_names_from_this_program_count_as_temporary() {
         assert!(is_part(beside(Path::new("file")).as_os_str()));
         for name in [
             ".g.part",
@@ -184,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn of_parts_only_old_files_are_removed() {
+    fn only_old_temporary_files_are_removed() {
         let scratch = tempfile::tempdir().unwrap();
         let [young, old, folder] = [(); 3].map(|()| beside(&scratch.path().join("file")));
         let of_the_user = scratch.path().join(".letter.part");
@@ -201,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_as_long_as_file_systems_take_can_be_written_and_replaced() {
+    fn the_longest_possible_name_can_be_written_and_replaced() {
         let scratch = tempfile::tempdir().unwrap();
         let path = scratch.path().join("x".repeat(255));
         create(&path, b"old").unwrap();
@@ -230,7 +229,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn through_a_symbolic_link_its_target_is_replaced() {
+    fn replacing_a_symbolic_link_replaces_its_target() {
         use std::os::unix::fs::symlink;
         let scratch = tempfile::tempdir().unwrap();
         let at = |name: &str| scratch.path().join(name);
@@ -263,7 +262,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_device_stays_one_and_says_when_it_is_full() {
+    fn a_device_is_written_to_and_reports_when_it_is_full() {
         use std::os::unix::fs::FileTypeExt;
         let error = replace(Path::new("/dev/full"), b"text").unwrap_err();
         assert_eq!(error.error.kind(), ErrorKind::StorageFull, "{error}");
@@ -273,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn of_many_who_create_one_file_one_succeeds_and_nobody_sees_half_of_it() {
+    fn of_many_threads_creating_one_file_one_succeeds_and_none_sees_half_of_it() {
         let scratch = tempfile::tempdir().unwrap();
         let path = scratch.path().join("file");
         let texts: Vec<Vec<u8>> = (b'a'..=b'h').map(|letter| vec![letter; 100_000]).collect();

@@ -1,8 +1,8 @@
-//! The yardstick: the same model as a straightforward program in `f32`.
+//! The baseline: the same model as a straightforward program in `f32`.
 //!
-//! tanh is the standard library's; input activations are worked out once a genome, hidden ones
-//! once a step. The world is the plain one. Its results differ from the integer ones only where
-//! rounding decides.
+//! tanh is the standard library's; input activations are computed once per genome, hidden ones
+//! once per step. The world is the plain one. Its results differ from the integer ones only through
+//! rounding.
 
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{Action, Decision, Genome, SensorBits, Turn};
@@ -12,7 +12,7 @@ struct Network {
     shape: Shape,
     /// Activation of each input for a bit of 0 and of 1.
     input: Vec<[f32; 2]>,
-    /// Rows of inputs' weights and, if there is one, the self-loop.
+    /// Rows of input weights and, if there is one, the self-loop.
     hidden: Vec<f32>,
     output: Vec<f32>,
 }
@@ -33,7 +33,7 @@ impl Network {
         }
     }
 
-    /// Bit k of the result is set where output k is not negative.
+    /// Bit k of the result is set if output k is not negative.
     fn forward(&self, inputs: u16, hidden: &mut [f32]) -> u16 {
         let row = self.shape.hidden_row();
         for (value, weights) in hidden.iter_mut().zip(self.hidden.chunks(row)) {
@@ -55,7 +55,7 @@ impl Network {
     }
 }
 
-/// The two networks of a genome whose predictions are free.
+/// The two networks of a genome with free predictions.
 pub struct Networks {
     action: Network,
     prediction: Network,
@@ -63,7 +63,7 @@ pub struct Networks {
 }
 
 impl Networks {
-    /// From a genome.
+    /// Converts a genome.
     ///
     /// # Panics
     /// If the genome's predictions are not free.
@@ -80,7 +80,7 @@ impl Networks {
     }
 }
 
-/// What all robots of a swarm remember.
+/// The memory of all robots of a swarm.
 pub struct Robots {
     hidden: Vec<Vec<f32>>,
     actions: Vec<Action>,
@@ -89,7 +89,7 @@ pub struct Robots {
 }
 
 impl Robots {
-    /// A swarm at its start.
+    /// A swarm at the start of a run.
     #[must_use]
     pub fn new(networks: &Networks, robots: usize) -> Self {
         Self {
@@ -100,7 +100,7 @@ impl Robots {
         }
     }
 
-    /// One step of all robots.
+    /// Makes one step of all robots.
     pub fn step(&mut self, networks: &Networks, readings: &[SensorBits]) -> Vec<Decision> {
         let robots = self.hidden.iter_mut().zip(&mut self.actions);
         let robots = robots.zip(&mut self.predictions).zip(readings);
@@ -134,7 +134,7 @@ impl Robots {
         decisions
     }
 
-    /// Bits that were as predicted so far.
+    /// Bits predicted correctly so far.
     #[must_use]
     pub fn matches(&self) -> u64 {
         self.matches

@@ -1,8 +1,8 @@
-//! How fast this program is on this machine, as ratios in one run.
+//! How fast this program is on this machine, as ratios measured in one run.
 //!
-//! Everything is timed on populations of real evolutions, early, middle and late ones
-//! ([`populations`]), in robot-steps a CPU-second, one thread. The yardstick is a straightforward
-//! floating-point program of the same model ([`f32_program`]).
+//! Everything is timed on early, middle and late populations of real evolutions ([`populations`]),
+//! in robot-steps per CPU-second on one thread. The baseline is a straightforward floating-point
+//! program of the same model ([`f32_program`]).
 
 pub mod f32_program;
 pub mod populations;
@@ -17,8 +17,8 @@ use std::io;
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
-/// What `evolver bench` prints. Speeds are robot-steps a CPU-second, model C on 15 × 15 unless
-/// named.
+/// The output of `evolver bench`. Speeds are robot-steps per CPU-second with model C on 15 × 15
+/// unless the name says otherwise.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[allow(missing_docs)]
 pub struct Report {
@@ -28,29 +28,29 @@ pub struct Report {
     pub fast_no_shortcut: f64,
     pub fast_noise: f64,
     pub f32: f64,
-    /// `fast` over `f32`.
+    /// `fast` relative to `f32`.
     pub ratio_fast_f32: f64,
-    /// Speed of an evolution on two threads over that of two one-thread evolutions side by side.
+    /// Speed of one evolution on two threads relative to two one-thread evolutions in parallel.
     pub threads_2_efficiency: f64,
-    /// Cost of a robot-step at 1,000,000 robots on 1500 × 1500 over that at 100 on 15 × 15, both
+    /// Cost of a robot-step with 1,000,000 robots on 1500 × 1500 relative to 100 on 15 × 15, both
     /// without the shortcut.
     pub million_robots_over_100: f64,
-    /// Largest memory of a default evolution, in MB; none where the system does not tell.
+    /// Largest memory of a default evolution, in MB; `None` if the system does not report it.
     pub peak_rss_mb: Option<f64>,
 }
 
-/// Repetitions of an evaluation, and steps, as in the paper.
+/// Repetitions and steps of an evaluation, as in the paper.
 const REPETITIONS: u32 = 10;
 const STEPS: u32 = 500;
-/// Sensor noise of the noisy speed.
+/// Sensor noise for the speed with noise.
 const NOISE: f64 = 0.1;
-/// Shortest time that a speed is taken over, in CPU-seconds.
+/// Shortest time over which a speed is measured, in CPU-seconds.
 const SECONDS_MIN: f64 = 1.5;
 
-/// Measures everything; `say` is told what is being measured.
+/// Measures everything; calls `say` with the name of each measurement.
 ///
 /// # Errors
-/// If this program cannot be started again for the measurements of whole evolutions.
+/// If this program cannot be started as a child to measure whole evolutions.
 pub fn run(path: Path, mut say: impl FnMut(&str)) -> io::Result<Report> {
     let on_15 = populations::c_15x15();
     let on_20 = populations::c_20x20();
@@ -58,14 +58,14 @@ pub fn run(path: Path, mut say: impl FnMut(&str)) -> io::Result<Report> {
     let quiet = trials(15, 0.0);
     let fast = |skips| Evaluator::new(Engine::Fast, path).with_repeats_skipped(skips);
 
-    // First, while this process is small: a child counts the memory that it was started from.
+    // First, while this process is small: a child's memory includes its parent's at the start.
     say("memory");
     let peak_rss_mb = peak_rss_mb()?;
     say("fast");
     let fast_15 = speed(&on_15, &quiet, &mut fast(true));
     say("fast, 20x20");
     let fast_20x20 = speed(&on_20, &trials(20, 0.0), &mut fast(true));
-    say("fast, without the shortcut of repeated states");
+    say("fast, without the shortcut for repeated states");
     let fast_no_shortcut = speed(&on_15, &quiet, &mut fast(false));
     say("fast, with noise");
     let fast_noise = speed(&noisy, &trials(15, NOISE), &mut fast(true));
@@ -110,15 +110,15 @@ fn trials(side: u32, noise: f64) -> TrialSet {
     TrialSet::new(scenario, SensorModel::C, trials)
 }
 
-/// A few genomes of early, middle and late generations, for what is slow.
+/// A few genomes of early, middle and late generations, for slow measurements.
 fn some_of_each(genomes: &[Genome]) -> Vec<Genome> {
     genomes.iter().step_by(6).cloned().collect()
 }
 
-/// Robot-steps a CPU-second over all genomes, repeated until it has taken long enough.
+/// Robot-steps per CPU-second over all genomes, repeated for long enough.
 fn speed(genomes: &[Genome], trials: &TrialSet, evaluator: &mut Evaluator) -> f64 {
     let steps = robot_steps(trials) * genomes.len() as f64;
-    // Once without counting: noise and memory are prepared once a generation.
+    // Once without timing: noise and memory are prepared once per generation.
     evaluator.evaluate(&genomes[0], trials);
     let watch = Stopwatch::start();
     for round in 1.. {
@@ -159,7 +159,7 @@ fn f32_speed(genomes: &[Genome], trials: &TrialSet) -> f64 {
     steps / watch.cpu_seconds()
 }
 
-/// One run of a million robots for a few steps.
+/// Speed of a million robots for a few steps.
 fn million_robots_speed(genome: &Genome, evaluator: &mut Evaluator) -> f64 {
     let scenario = scenario(1500, 1_000_000, 40, 0.0);
     let trial = scenario.trial(SeedTree::new(1), 0, 0);
@@ -167,7 +167,7 @@ fn million_robots_speed(genome: &Genome, evaluator: &mut Evaluator) -> f64 {
     speed(std::slice::from_ref(genome), &trials, evaluator)
 }
 
-/// An evolution by this same program, in a folder of its own that is removed.
+/// Starts an evolution by this program in a temporary folder.
 fn evolution(folder: &tempfile::TempDir, name: &str, flags: &[&str]) -> io::Result<Child> {
     Command::new(std::env::current_exe()?)
         .args(["evolve", "--seed", "1", "--progress", "none", "--out"])
@@ -177,7 +177,7 @@ fn evolution(folder: &tempfile::TempDir, name: &str, flags: &[&str]) -> io::Resu
         .spawn()
 }
 
-/// Times of the two ways in turn, so that a machine that changes its speed changes both.
+/// Times both alternately, so that changes in the machine's speed affect both.
 fn threads_2_efficiency() -> io::Result<f64> {
     const ROUNDS: u32 = 3;
     let folder = tempfile::tempdir()?;
@@ -194,11 +194,11 @@ fn threads_2_efficiency() -> io::Result<f64> {
         second.wait()?;
         apart += watch.elapsed().as_secs_f64();
     }
-    // One evolution in `together` seconds, two in `apart` seconds.
+    // One evolution takes `together` seconds, two take `apart` seconds.
     Ok(apart / 2.0 / together)
 }
 
-/// A default evolution of some generations: its memory does not grow with them.
+/// Memory of a default evolution of a few generations: it does not grow with their number.
 fn peak_rss_mb() -> io::Result<Option<f64>> {
     let folder = tempfile::tempdir()?;
     evolution(&folder, "memory", &["--generations", "10"])?.wait()?;

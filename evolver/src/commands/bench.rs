@@ -4,10 +4,10 @@ use super::BadInput;
 use crate::bench::{self, Report};
 use minimal_surprise_sim::Path;
 
-/// Measures and prints.
+/// Measures and prints the results.
 ///
 /// # Errors
-/// [`BadInput`] if the environment names a path that this processor does not have.
+/// [`BadInput`] if the environment names a vector path that this processor does not support.
 pub fn bench(json: bool) -> anyhow::Result<()> {
     let path = Path::from_environment().map_err(BadInput::new)?;
     let report = bench::run(path, |what| {
@@ -27,13 +27,13 @@ fn text(report: &Report, path: Path) -> String {
     let millions = |speed: f64| format!("{:.1}", speed / 1e6);
     let memory = report
         .peak_rss_mb
-        .map_or("not told".to_owned(), |mb| format!("{mb:.1}"));
+        .map_or("unknown".to_owned(), |mb| format!("{mb:.1}"));
     let rows = [
         ("plain", millions(report.plain)),
         ("fast", millions(report.fast)),
         ("fast, 20x20", millions(report.fast_20x20)),
         (
-            "fast, no shortcut of repeated states",
+            "fast, no shortcut for repeated states",
             millions(report.fast_no_shortcut),
         ),
         ("fast, 10 % noise", millions(report.fast_noise)),
@@ -50,7 +50,7 @@ fn text(report: &Report, path: Path) -> String {
         ("memory of an evolution, MB", memory),
     ];
     let mut text = format!(
-        "path {}; speeds in million robot-steps a CPU-second, model C, 15x15\n",
+        "path {}; speeds in million robot-steps per CPU-second, model C, 15x15\n",
         path.name()
     );
     for (name, value) in rows {

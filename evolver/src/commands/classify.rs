@@ -1,4 +1,4 @@
-//! `evolver classify`: what a swarm formed, and how the run went.
+//! `evolver classify`: what a swarm formed, and measures of the run.
 
 use super::BadInput;
 use super::errors::unusable;
@@ -41,7 +41,7 @@ pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The last state in a file, by what the file starts with.
+/// The last state in a file, whose format is recognised by its start.
 fn read_state(path: &Path) -> anyhow::Result<(Grid, Vec<Pose>)> {
     let bytes = files::read(path, DATA_BYTES_MAX).map_err(unusable)?;
     let text = text::decode(&bytes).map_err(|error| {

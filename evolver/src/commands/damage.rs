@@ -1,4 +1,4 @@
-//! `evolver damage`: take a part of a structure away, or scatter it, and see what the swarm does.
+//! `evolver damage`: removes or repositions robots of a structure, and measures the recovery.
 
 use super::errors::unusable;
 use super::{BadInput, flag, thread_pool, threads_flag};
@@ -17,20 +17,20 @@ use std::path::PathBuf;
 pub struct DamageArgs {
     /// The run directory.
     run: PathBuf,
-    /// Corners of the rectangle, ends included; x0 > x1 or y0 > y1 goes across the edge.
+    /// Corners of the rectangle, inclusive; it wraps around the edge if x0 > x1 or y0 > y1.
     #[arg(long, value_name = "x0,y0,x1,y1", allow_hyphen_values = true)]
     area: String,
-    /// Take the robots in the area away.
+    /// Remove the robots in the area.
     #[arg(
         long,
         required_unless_present = "reposition",
         conflicts_with = "reposition"
     )]
     remove: bool,
-    /// Put the robots in the area elsewhere.
+    /// Reposition the robots in the area at random.
     #[arg(long)]
     reposition: bool,
-    /// Runs a row.
+    /// Runs per row.
     #[arg(
         long,
         value_name = "N",
@@ -38,10 +38,10 @@ pub struct DamageArgs {
         allow_hyphen_values = true
     )]
     repeat: String,
-    /// The structure to follow [default: the one that the run is named after].
+    /// The structure to follow [default: the run's dominant structure].
     #[arg(long, value_name = "NAME")]
     structure: Option<String>,
-    /// Threads [default: one a core]; the result does not depend on them.
+    /// Threads [default: one per core]; the result does not depend on them.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     threads: Option<String>,
     /// Print JSON.
@@ -52,7 +52,7 @@ pub struct DamageArgs {
 /// Damages the final state of a run.
 ///
 /// # Errors
-/// [`BadInput`] names the flag, the value and what would be valid.
+/// [`BadInput`] names the flag, the value and the valid values.
 pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
     let finished = FinishedRun::read_and_check(&arguments.run).map_err(unusable)?;
     let grid = finished.settings.scenario().grid();
@@ -107,7 +107,9 @@ pub(super) fn corners(text: &str) -> Result<[u32; 4], String> {
         .collect();
     numbers
         .and_then(|numbers| numbers.try_into().ok())
-        .ok_or_else(|| "expected four cells from the south-west corner, as in 2,3,6,7".to_owned())
+        .ok_or_else(|| {
+            "expected four coordinates from the south-west cell, such as 2,3,6,7".to_owned()
+        })
 }
 
 fn structure_named(text: &str) -> Result<Structure, String> {

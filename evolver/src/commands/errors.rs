@@ -164,7 +164,7 @@ impl AboutInput for GalleryError {
             Self::Empty(_) | Self::Exists(_) | Self::Page { .. } | Self::TooMuch(_) => true,
             Self::Run(error) => error.is_bad_input(),
             Self::File(error) => error.is_bad_input(),
-            Self::World { .. } | Self::Damaged(_) => false,
+            _ => false,
         }
     }
 }

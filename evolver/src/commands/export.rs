@@ -1,4 +1,4 @@
-//! `evolver export`: runs and genomes in the formats of other programs.
+//! `evolver export`: writes runs and genomes in the formats of other programs.
 
 use super::errors::unusable;
 use super::replay::write_file;
@@ -28,7 +28,7 @@ pub struct ExportArgs {
     /// The file to write; must not exist [default: standard output].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// For bin, slot and hex: where in the chip's memory that will be. The default is slot 1 of an
+    /// For bin, slot and hex: the address in the chip's memory. The default is slot 1 of an
     /// STM32F405 or STM32F407 with 1 MiB; slot 0 is at 0x080c0000.
     #[arg(
         long,
@@ -37,8 +37,8 @@ pub struct ExportArgs {
         allow_hyphen_values = true
     )]
     address: String,
-    /// For slot: place of the genome among all written to this robot, from 1 on. The robot runs
-    /// the one with the larger; `flash` says which that is.
+    /// For slot: number of this genome among all written to this robot, from 1. The robot runs the
+    /// genome with the larger number; `flash` prints its number.
     #[arg(
         long,
         value_name = "N",
@@ -46,8 +46,8 @@ pub struct ExportArgs {
         allow_hyphen_values = true
     )]
     write_count: String,
-    /// For c and rust: what the genome is called there [default: after the run or the file, and the
-    /// genome's CRC, so that several fit into one program].
+    /// For c and rust: the name of the array [default: from the run or file name and the genome's
+    /// CRC, so that one program can hold several].
     #[arg(long, value_name = "IDENTIFIER", allow_hyphen_values = true)]
     name: Option<String>,
     /// For bin and slot: the chip, as probe-rs names it.
@@ -58,11 +58,11 @@ pub struct ExportArgs {
 /// Formats of other programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
-    /// The genome as it is, for a firmware that reads it there; says how to write it to a chip
-    /// with probe-rs.
+    /// The genome container, for a firmware that reads it at a fixed address; prints how to write
+    /// it with probe-rs.
     Bin,
-    /// A genome slot, for a firmware that has slots, with the genome in it; says how to write it
-    /// to a chip with probe-rs.
+    /// A genome slot holding the genome, for a firmware with slots; prints how to write it with
+    /// probe-rs.
     Slot,
     /// The genome as a C header.
     C,
@@ -70,20 +70,20 @@ pub enum Format {
     Rust,
     /// The genome as Intel HEX.
     Hex,
-    /// `agent_trajectory` of the authors' program: poses of every step.
+    /// `agent_trajectory` of the authors' program: the poses of every step.
     Trajectory,
 }
 
 /// Exports a genome or a run.
 ///
 /// # Errors
-/// [`BadInput`] if genome or run cannot be read or the file exists.
+/// [`BadInput`] if the genome or run cannot be read, or the file exists.
 pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
     if arguments.name.is_some() && !matches!(arguments.format, Format::C | Format::Rust) {
-        return Err(BadInput::new("--name goes with --format c and --format rust").into());
+        return Err(BadInput::new("--name requires --format c or --format rust").into());
     }
     let address = flag("address", &arguments.address, memory_address)?;
-    // Enough counts are left that the robot can always be updated over its line.
+    // Leaves enough numbers for all later updates over the robot's line.
     let write_count = flag("write-count", &arguments.write_count, |text| {
         count(text, MADE_WRITE_COUNT_MAX)
     })?;
@@ -100,7 +100,7 @@ pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
         Some(path) => write_file("out", path, &bytes, Existing::Refuse)?,
     }
     let file = match arguments.format {
-        // The genome file is the raw form itself.
+        // The genome file is the raw container.
         Format::Bin => {
             let out = arguments.out.clone();
             Some(out.unwrap_or_else(|| genome_file(&arguments.from)))
@@ -121,7 +121,7 @@ fn is_for_a_chip(format: Format) -> bool {
 fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
     if arguments.from.is_file() {
         return Err(BadInput::new(format!(
-            "{}: a trajectory is exported of a run directory, not of a file",
+            "{}: is a file; a trajectory can be exported only from a run directory",
             arguments.from.display()
         ))
         .into());
@@ -159,7 +159,7 @@ fn genome(
         Format::Hex => {
             let text = intel_hex(&container, address).ok_or_else(|| {
                 BadInput::new(format!(
-                    "--address = {}: the genome's {} bytes would go beyond 0xffffffff",
+                    "--address = {}: the genome's {} bytes would extend beyond 0xffffffff",
                     arguments.address,
                     container.len()
                 ))
@@ -171,7 +171,7 @@ fn genome(
     })
 }
 
-/// What a genome is called in source.
+/// The genome's name in source code.
 fn symbol(arguments: &ExportArgs, container: &[u8]) -> Result<String, BadInput> {
     if let Some(name) = &arguments.name {
         return flag("name", name, |name| {
@@ -179,7 +179,7 @@ fn symbol(arguments: &ExportArgs, container: &[u8]) -> Result<String, BadInput> 
             checked.map(str::to_owned).map_err(str::to_owned)
         });
     }
-    // A run's genome is called after the run.
+    // A run's genome is named after the run.
     let file = genome_file(&arguments.from);
     let file = file.canonicalize().unwrap_or(file);
     let stem = file.file_stem().filter(|stem| *stem != "best");

@@ -1,4 +1,4 @@
-//! `evolver flash`: a genome onto a robot.
+//! `evolver flash`: writes a genome to a robot.
 
 use super::port::{PortArgs, failed};
 use super::read_genome;
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// Which genome, and where the robot is.
 #[derive(Debug, Args)]
 pub struct FlashArgs {
-    /// The genome file, or a run directory.
+    /// A genome file or a run directory.
     #[arg(value_name = "GENOME|RUN")]
     genome: PathBuf,
     #[command(flatten)]
@@ -21,8 +21,8 @@ pub struct FlashArgs {
 /// Writes a genome to the robot on a port and starts it.
 ///
 /// # Errors
-/// If the genome cannot be used, there is no such robot, or the robot fails; what a robot runs
-/// changes only when all of the new genome is there.
+/// If the genome cannot be used, there is no such robot, or the robot fails. The robot switches
+/// genomes only once the new one is complete.
 pub fn flash(arguments: &FlashArgs) -> anyhow::Result<()> {
     let container = read_genome(&arguments.genome)?;
     let port = &arguments.port;

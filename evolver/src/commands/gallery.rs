@@ -1,4 +1,4 @@
-//! `evolver gallery`: all runs at a glance, each a step from its replay.
+//! `evolver gallery`: an overview of all runs, linked to their replays.
 
 use super::errors::{name_damaged, unusable};
 use super::{thread_pool, threads_flag};
@@ -12,16 +12,16 @@ use std::path::PathBuf;
 /// Which runs, and where to.
 #[derive(Debug, Args)]
 pub struct GalleryArgs {
-    /// Run directories, or directories that hold run directories.
+    /// Run directories, or directories that contain run directories.
     #[arg(required = true, value_name = "DIR")]
     directories: Vec<PathBuf>,
-    /// The folder for index.html and a page a run.
+    /// The folder for index.html and one page per run.
     #[arg(long, value_name = "FOLDER", default_value = "gallery")]
     out: PathBuf,
-    /// Replace the pages of a folder that exists.
+    /// Replace the pages in an existing folder.
     #[arg(long)]
     overwrite: bool,
-    /// Threads [default: one a core]; the pages do not depend on them.
+    /// Threads [default: one per core]; the pages do not depend on them.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     threads: Option<String>,
 }
@@ -29,7 +29,7 @@ pub struct GalleryArgs {
 /// Writes a gallery.
 ///
 /// # Errors
-/// [`BadInput`](super::BadInput) if there is nothing to show, or no place for it.
+/// [`BadInput`](super::BadInput) if there are no runs, or the folder cannot be used.
 pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
     let threads = threads_flag(&arguments.threads)?;
     let existing = Existing::with_overwrite(arguments.overwrite);
@@ -38,10 +38,10 @@ pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
         .map_err(unusable)?;
     let left_out = match written.unfinished {
         0 => String::new(),
-        n => format!("; {n} that have not ended left out"),
+        n => format!("; {n} unfinished runs left out"),
     };
     if written.by_another {
-        tell!("another process has written the same gallery meanwhile");
+        tell!("another process has written the same gallery in the meantime");
     }
     show_line!(
         "{} ({} runs, {:.1} MB{left_out})",

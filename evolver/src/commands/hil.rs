@@ -1,4 +1,4 @@
-//! `evolver hil`: a simulated swarm with the robot on the line in it.
+//! `evolver hil`: simulates a swarm that includes the robot on a serial line.
 
 use super::errors::unusable;
 use super::port::{PortArgs, failed};
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(override_usage = "evolver hil [OPTIONS] <--port <PORT>|--simulate> <RUN>")]
 pub struct HilArgs {
-    /// A run directory, which says everything about the run; or a genome file.
+    /// A run directory, which records all conditions; or a genome file.
     run: PathBuf,
     #[command(flatten)]
     port: Option<PortArgs>,
@@ -33,7 +33,7 @@ pub struct HilArgs {
     conditions: GenomeConditions,
 }
 
-/// Runs a swarm whose robot 0 is on the line, and compares with the simulation.
+/// Runs a swarm whose robot 0 is on the line, and compares the result with the simulation.
 ///
 /// # Errors
 /// [`BadInput`] if the run cannot be read, there is no such robot, or it runs another genome.
@@ -56,7 +56,7 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
     let container = read_genome(&genome)?;
     if !is_in_use(robot.identity().genome, &container) {
         return Err(BadInput::new(format!(
-            "--port = {}: the robot runs {}, not {}; put that onto it with: {}",
+            "--port = {}: the robot runs {}, not {}; write that genome to it with: {}",
             port.name(),
             describe(robot.identity().genome),
             terminal_path(&genome),
@@ -85,7 +85,7 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
     }
 }
 
-/// The run that a directory holds, and the file of its genome.
+/// The run recorded in a directory, and its genome file.
 fn of_run(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
     let directory = &arguments.run;
     arguments
@@ -100,7 +100,7 @@ fn of_run(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
     Ok((course, directory.join(BEST)))
 }
 
-/// The run that the flags ask for: the first trial of their seed.
+/// The run that the flags define: the first trial of their seed.
 fn of_genome(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
     let bytes = read_genome(&arguments.run)?;
     let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
@@ -115,7 +115,7 @@ fn of_genome(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
     Ok((course, Path::new(&arguments.run).to_owned()))
 }
 
-/// The run with the robot, from a fresh start of it.
+/// The run with the robot, after a reset of its controller.
 fn run(course: &Course, robot: &mut Robot) -> Result<Ran, HilError<RobotError>> {
     robot.reset().map_err(HilError::Robot)?;
     let bar = ProgressBar::new(course.scenario.steps().into());
@@ -128,7 +128,7 @@ fn run(course: &Course, robot: &mut Robot) -> Result<Ran, HilError<RobotError>> 
     ran
 }
 
-/// Where robot and simulation parted.
+/// The first difference between robot and simulation.
 fn difference(ran: &Ran, simulated: &Ran) -> String {
     match ran.first_difference(simulated) {
         Some(step) => {

@@ -1,4 +1,4 @@
-//! `evolver import`: genome containers of the genome text of the authors' program.
+//! `evolver import`: converts genome text of the authors' program to genome containers.
 
 use super::errors::unusable;
 use super::{BadInput, flag};
@@ -14,28 +14,28 @@ use minimal_surprise_sim::exchange::{
 };
 use std::path::{Path, PathBuf};
 
-/// The text files, and what they hold.
+/// The text files, and what they contain.
 #[derive(Debug, Args)]
 pub struct ImportArgs {
     /// The `action_genomes` file.
     #[arg(long, value_name = "FILE")]
     action: PathBuf,
-    /// The `prediction_genomes` file; not needed where all predictions are predefined.
+    /// The `prediction_genomes` file; not needed if all predictions are predefined.
     #[arg(long, value_name = "FILE")]
     prediction: Option<PathBuf>,
     /// Import only this generation.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     generation: Option<String>,
-    /// Sensor model: a, b or c [default: by the length of the rows].
+    /// Sensor model: a, b or c [default: from the length of the rows].
     #[arg(long, value_name = "MODEL")]
     sensor_model: Option<String>,
-    /// All predictions were fixed to this template.
+    /// The template that all predictions were fixed to.
     #[arg(long, value_name = "TEMPLATE")]
     predefine: Option<String>,
-    /// The predictions that this template sets were fixed [default: by the length of the rows].
+    /// The template that some predictions were fixed to [default: from the length of the rows].
     #[arg(long, value_name = "TEMPLATE")]
     predefine_partly: Option<String>,
-    /// Directory for the genomes; must not exist.
+    /// The directory for the genomes; must not exist.
     #[arg(long, value_name = "DIR", default_value = "imported")]
     out: PathBuf,
 }
@@ -92,7 +92,7 @@ pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The generations in a file, with their numbers; if only one is wanted, no other has to be right.
+/// The numbered generations in a file; if only one is wanted, the others may be invalid.
 fn read(path: &Path, only: Option<u32>) -> anyhow::Result<Vec<(u32, GenomeRows)>> {
     let text = files::read_text(path, DATA_BYTES_MAX).map_err(unusable)?;
     let about = |error: ExchangeError| BadInput::new(format!("{}, {error}", path.display()));
@@ -118,7 +118,7 @@ fn read(path: &Path, only: Option<u32>) -> anyhow::Result<Vec<(u32, GenomeRows)>
     }
 }
 
-/// As the flags say; what they leave open, by the length to which rows are filled up.
+/// From the flags; what they leave open, from the length of the rows, padding included.
 fn topology(arguments: &ImportArgs, action: &[(u32, GenomeRows)]) -> Result<Topology, BadInput> {
     let length = action.first().map_or(0, |(_, rows)| rows.rows[0].len());
     let mut given = Overrides::default();
@@ -176,7 +176,7 @@ fn report(topology: Topology, directory: &Path, imported: &[(u32, ImportedGenome
     for (generation, imported) in imported {
         let path = directory.join(name(*generation));
         text += &format!(
-            "{}: largest rounding {:.2e}, {} weights that did not fit\n",
+            "{}: largest rounding error {:.2e}, {} weights out of range\n",
             terminal_path(&path),
             imported.rounding_error_max,
             imported.saturated.len()

@@ -1,4 +1,4 @@
-//! `evolver monitor`: what a robot does, live.
+//! `evolver monitor`: shows live what a robot does.
 
 use super::flag;
 use super::port::{PortArgs, failed};
@@ -15,25 +15,25 @@ use serde_json::json;
 use std::io;
 use std::time::{Duration, Instant};
 
-/// Where the robot is, and how to show it.
+/// Which robot, and how to show it.
 #[derive(Debug, Args)]
 pub struct MonitorArgs {
     #[command(flatten)]
     port: PortArgs,
-    /// End after so many seconds [default: at Ctrl-C].
+    /// Stop after this many seconds [default: at Ctrl-C].
     #[arg(long = "for", value_name = "SECONDS", allow_hyphen_values = true)]
     seconds: Option<String>,
-    /// Print a JSON object a second.
+    /// Print one JSON object per second.
     #[arg(long)]
     json: bool,
 }
 
-/// Shows every second what the robot has done.
+/// Shows the robot's activity every second.
 ///
 /// # Errors
-/// If there is no such robot, it goes away, or what it reports is impossible.
+/// If there is no such robot, it disconnects, or its reports are impossible.
 pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
-    // Without a time, being interrupted is how it ends.
+    // Without a time, an interruption is the normal end.
     let (seconds, interrupted) = match &arguments.seconds {
         None => (u32::MAX, Exit::Done),
         Some(text) => {
@@ -63,11 +63,11 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
             told => told.map_err(failed)?,
         };
         let Some((report, line)) = told else {
-            tell!("{port}: it was restarted; {}", robot.identity());
+            tell!("{port}: the robot restarted; {}", robot.identity());
             before = None;
             continue;
         };
-        // The first one is what the first second is compared with.
+        // The first report is the reference for the first second.
         if second > 0 {
             let sample = Sample {
                 second,
@@ -76,7 +76,7 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
                 recent: before.and_then(|before| since(before, report.surprise)),
             };
             match show.sample(&sample) {
-                // Whoever read this has seen enough.
+                // The reader has closed the pipe: a normal end.
                 Err(error) if output::is_gone(&error) => return Ok(Exit::Done),
                 shown => shown?,
             }
@@ -89,12 +89,12 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
     Ok(exit)
 }
 
-/// Share of bits mispredicted; none before the first.
+/// Share of bits mispredicted; `None` before the first bit.
 fn share(surprise: Surprise) -> Option<f64> {
     (surprise.seen_bits > 0).then(|| surprise.mispredicted_bits as f64 / surprise.seen_bits as f64)
 }
 
-/// One second.
+/// The activity in one second.
 struct Sample {
     second: u64,
     report: Report,
@@ -102,7 +102,7 @@ struct Sample {
     recent: Option<Surprise>,
 }
 
-/// How it is shown.
+/// The output format.
 enum Show {
     OneLine,
     Lines,
@@ -131,14 +131,10 @@ impl Sample {
             |share: Option<f64>| share.map_or("-".to_owned(), |share| format!("{share:.3}"));
         let report = self.report;
         let mut text = format!(
-            "{} s  {}  surprise {} (in this second {})  straight {}, of these held back {}  \
+            "{} s  {}  surprise {} (this second {})  straight {}, of which held back {}  \
              left {}  right {}",
             self.second,
-            if report.running {
-                "running"
-            } else {
-                "standing"
-            },
+            if report.running { "running" } else { "stopped" },
             words(share(report.surprise)),
             words(self.recent.and_then(share)),
             report.straight,

@@ -1,4 +1,4 @@
-//! `evolver replay` into files: stills and animations.
+//! `evolver replay` to files: stills and animations.
 
 use super::replay::{refuse_existing, write_file};
 use super::{BadInput, flag};
@@ -8,12 +8,12 @@ use minimal_surprise_evolution::settings::count;
 use minimal_surprise_replay::palette::{DARK, LIGHT, Theme};
 use minimal_surprise_replay::pictures::film::Film;
 use minimal_surprise_replay::pictures::raster::png;
-use minimal_surprise_replay::pictures::{Drawing, Look, PictureError, Size, What, still};
+use minimal_surprise_replay::pictures::{Drawing, Picture, PictureError, Size, Style, still};
 use minimal_surprise_replay::recording::Recording;
 use minimal_surprise_replay::scene::Colouring;
 use std::path::{Path, PathBuf};
 
-/// Which pictures to write, and what they look like.
+/// Which pictures to write, and how they look.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Pictures")]
 #[command(group = ArgGroup::new("still").args(["svg", "png"]).multiple(true))]
@@ -29,16 +29,16 @@ pub struct PictureArgs {
     /// Write an animation as GIF; the file must not exist.
     #[arg(long, value_name = "FILE")]
     gif: Option<PathBuf>,
-    /// Write an animation as MP4, by the program ffmpeg; the file must not exist.
+    /// Write an animation as MP4, encoded by ffmpeg; the file must not exist.
     #[arg(long, value_name = "FILE")]
     mp4: Option<PathBuf>,
-    /// What a still shows [default: damage after --remove or --reposition, else state].
+    /// What a still shows [default: damage with --remove or --reposition, else state].
     #[arg(long, value_enum, requires = "still")]
-    what: Option<What>,
+    what: Option<Picture>,
     /// The state that a still shows, 0 to the number of steps [default: the last].
     #[arg(long, value_name = "T", requires = "still", allow_hyphen_values = true)]
     at: Option<String>,
-    /// Look into this robot: mark what it senses and predicted.
+    /// Select this robot: mark what it senses and predicted.
     #[arg(
         long,
         value_name = "N",
@@ -46,10 +46,10 @@ pub struct PictureArgs {
         allow_hyphen_values = true
     )]
     robot: Option<String>,
-    /// On which ground.
+    /// The background.
     #[arg(long, value_enum, default_value_t, requires = "picture")]
     theme: Ground,
-    /// Width of a still, in millimetres; the default is a column of a paper.
+    /// Width of a still, in millimetres; the default is one column of a paper.
     #[arg(
         long,
         value_name = "MM",
@@ -58,7 +58,7 @@ pub struct PictureArgs {
         allow_hyphen_values = true
     )]
     width_mm: String,
-    /// Dots an inch of a PNG.
+    /// Resolution of a PNG, in dots per inch.
     #[arg(
         long,
         value_name = "N",
@@ -79,7 +79,7 @@ pub struct PictureArgs {
     /// Steps between two frames of an animation [default: about a hundred frames].
     #[arg(long, value_name = "N", requires = "film", allow_hyphen_values = true)]
     every: Option<String>,
-    /// Frames a second of an animation.
+    /// Frames per second of an animation.
     #[arg(
         long,
         value_name = "N",
@@ -90,7 +90,7 @@ pub struct PictureArgs {
     fps: String,
 }
 
-/// Light or dark.
+/// The background.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum Ground {
     /// Dark on light.
@@ -109,7 +109,7 @@ impl Ground {
     }
 }
 
-/// What an animation without `--every` has about as many frames as.
+/// Approximate number of frames of an animation without `--every`.
 const FRAMES: usize = 100;
 
 impl PictureArgs {
@@ -122,7 +122,7 @@ impl PictureArgs {
         ]
     }
 
-    /// Whether any picture is to be written.
+    /// Whether any picture is requested.
     pub(super) fn is_any(&self) -> bool {
         self.files().iter().any(|(_, file)| file.is_some())
     }
@@ -140,7 +140,7 @@ impl PictureArgs {
     /// Writes the pictures.
     ///
     /// # Errors
-    /// [`BadInput`] names the flag, the value and what would be valid.
+    /// [`BadInput`] names the flag, the value and the valid values.
     pub(super) fn write(
         &self,
         recording: &Recording,
@@ -165,35 +165,35 @@ impl PictureArgs {
             None => None,
         };
         let what = self.what.unwrap_or(match recording.origin.damage {
-            Some(_) => What::Damage,
-            None => What::State,
+            Some(_) => Picture::Damage,
+            None => Picture::State,
         });
-        if let (Some(at), false) = (at, matches!(what, What::State | What::Damage)) {
+        if let (Some(at), false) = (at, matches!(what, Picture::State | Picture::Damage)) {
             let what = what.to_possible_value();
             let what = what.as_ref().map_or("", |value| value.get_name());
             return Err(BadInput::new(format!(
-                "--at = {at}: --what = {what} shows the whole run; only state and damage are of one state"
+                "--at = {at}: --what = {what} shows the whole run; only state and damage show one state"
             ))
             .into());
         }
         if self.mp4.is_some() {
             Film::look_for_ffmpeg().map_err(|error| self.about(error))?;
         }
-        let look = |size| Look {
+        let style = |size| Style {
             size,
             theme: self.theme.theme(),
             colouring,
             robot,
         };
         if self.svg.is_some() || self.png.is_some() {
-            let look = look(Size::Paper(f64::from(width)));
-            let drawing = still(recording, what, at, &look).map_err(|error| self.about(error))?;
+            let style = style(Size::Paper(f64::from(width)));
+            let drawing = still(recording, what, at, &style).map_err(|error| self.about(error))?;
             self.write_still(&drawing, dpi, existing)?;
         }
-        let look = look(Size::Screen(cell));
+        let style = style(Size::Screen(cell));
         let film = Film {
             recording,
-            look: &look,
+            style: &style,
             every,
             frames_per_second: fps,
         };
@@ -219,7 +219,7 @@ impl PictureArgs {
         Ok(())
     }
 
-    /// Says which flag asked for what cannot be had.
+    /// Attributes an error to its flag.
     fn about(&self, error: PictureError) -> anyhow::Error {
         let given = |flag: &str, value: &Option<String>| {
             let value = value.as_deref().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The robot on a serial port, as commands use it.
+//! The robot on a serial port, for all commands that use it.
 
 use super::{BadInput, Interrupted, flag};
 use crate::report::summary::program;
@@ -10,19 +10,19 @@ use minimal_surprise_evolution::text::shell_path;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Speed of the line unless told otherwise.
+/// Default speed of the line, in bits per second.
 const BAUD: &str = "115200";
 
-/// Where a robot is.
+/// Which robot.
 #[derive(Debug, Args)]
 pub struct PortArgs {
-    /// The serial port that the robot is on, as in /dev/ttyACM0 or COM3.
+    /// The robot's serial port, such as /dev/ttyACM0 or COM3.
     #[arg(long, value_name = "PORT")]
     port: PathBuf,
-    /// Speed of the line, in bits a second.
+    /// Speed of the line, in bits per second.
     #[arg(long, value_name = "N", default_value = BAUD, allow_hyphen_values = true)]
     baud: String,
-    /// Ask for this long until the robot answers: for boards that restart when the port is opened.
+    /// How long to wait for the robot, in seconds: some boards restart when the port is opened.
     #[arg(
         long,
         value_name = "SECONDS",
@@ -38,8 +38,8 @@ impl PortArgs {
         PortName(self.port.clone())
     }
 
-    /// Checks the flags and connects. From here on the first signal ends what the command does with
-    /// the robot, and the second ends the program.
+    /// Checks the flags and connects. From here on the first signal ends the work with the robot,
+    /// and the second exits.
     pub(super) fn connect(&self) -> anyhow::Result<Robot> {
         let baud = flag("baud", &self.baud, |text| count(text, 12_000_000))?;
         let wait = flag("wait", &self.wait, |text| count(text, 3600))?;
@@ -55,7 +55,7 @@ impl PortArgs {
         Ok(robot)
     }
 
-    /// The line that runs another command on the same port.
+    /// The command line of another command on the same port.
     pub(super) fn command(&self, command: &str) -> String {
         let port = shell_path(&self.port);
         let line = format!("{} {command} --port {port}", program());
@@ -66,7 +66,7 @@ impl PortArgs {
     }
 }
 
-/// What a command ends with after an error of port or robot.
+/// The error of a command after an error of the port or robot.
 pub(super) fn failed(error: RobotError) -> anyhow::Error {
     match error.problem {
         Problem::NoSuchPort { .. } | Problem::NotAPort { .. } | Problem::NotUtf8 => {

@@ -1,4 +1,4 @@
-//! `evolver replay`: look at a run.
+//! `evolver replay`: shows a run.
 
 use super::damage::corners;
 use super::errors::unusable;
@@ -30,31 +30,31 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use supports_color::Stream;
 
-/// The keys of the terminal.
+/// Help on the keys in the terminal.
 const KEYS: &str = "\
 Keys in the terminal:
   space               play, pause
   ← →                 step back, forward; ↑ ↓ (PgUp PgDn) by ten
   0–9 Home End        seek, by tenths of the run
   + -                 speed
-  n p (Tab Shift-Tab) next, previous robot: what it senses and what it had predicted; Esc lets go
+  n p (Tab Shift-Tab) select next, previous robot: what it senses and predicted; Esc deselects
   c                   colour: structure, surprise, plain
   b                   the swarm before it was damaged, and back
   h j k l             scroll, where the grid is larger than the window
   q Ctrl-C            quit";
 
-/// What to look at, and how.
+/// What to show, and how.
 #[derive(Debug, Args)]
 #[command(after_help = KEYS)]
 pub struct ReplayArgs {
     /// A run directory, a genome file, or an agent_trajectory.
     run: PathBuf,
-    /// For a run: take the robots in this area of its final state away, and go on from there. Corners
-    /// are included; x0 > x1 or y0 > y1 goes across the edge.
+    /// For a run: remove the robots in this area of its final state, and continue. Corners are
+    /// inclusive; the area wraps around the edge if x0 > x1 or y0 > y1.
     #[arg(long, value_name = "x0,y0,x1,y1", allow_hyphen_values = true)]
     remove: Option<String>,
-    /// For a run: put the robots in this area of its final state elsewhere, and go on from there. Corners
-    /// are included; x0 > x1 or y0 > y1 goes across the edge.
+    /// For a run: reposition the robots in this area of its final state at random, and continue.
+    /// Corners are inclusive; the area wraps around the edge if x0 > x1 or y0 > y1.
     #[arg(
         long,
         value_name = "x0,y0,x1,y1",
@@ -64,15 +64,15 @@ pub struct ReplayArgs {
     reposition: Option<String>,
     #[command(flatten)]
     conditions: GenomeConditions,
-    /// What the colours of robots say.
+    /// What the colours of robots show.
     #[arg(long, value_enum, default_value_t)]
     colour: Colouring,
     #[command(flatten)]
     pictures: PictureArgs,
-    /// Write one page for a browser, which needs nothing else.
+    /// Write a self-contained page for a browser.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Replace a file that exists.
+    /// Replace an existing file.
     #[arg(long)]
     overwrite: bool,
 }
@@ -80,7 +80,7 @@ pub struct ReplayArgs {
 /// Shows a run.
 ///
 /// # Errors
-/// [`BadInput`] if there is nothing to look at, or a flag does not fit.
+/// [`BadInput`] if there is nothing to show, or a flag does not fit.
 pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<Exit> {
     let overwrite = arguments.overwrite;
     let existing = Existing::with_overwrite(overwrite);
@@ -107,14 +107,14 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<Exit> {
             .pictures
             .write(&recording, arguments.colour, existing)?;
     } else if arguments.html.is_none() {
-        // In the terminal Ctrl-C is a key; this is for those who are not at its keyboard.
+        // In the terminal Ctrl-C is a key; this handles signals from elsewhere.
         on_signal(ask_to_stop)?;
         return in_terminal(&recording, arguments.colour, stop());
     }
     Ok(Exit::Done)
 }
 
-/// Plays a recording in the terminal until the user, or `stop`, ends it; says which of them did.
+/// Plays a recording in the terminal until the user or `stop` ends it; returns which of them did.
 ///
 /// # Errors
 /// [`BadInput`] if there is no terminal.
@@ -130,20 +130,20 @@ pub(super) fn in_terminal(
     })?;
     let ascii = output::stdout_is_ascii();
     match terminal::play(recording, colouring, paints(), ascii, stop) {
-        // A terminal that closes fails, too.
+        // Drawing also fails if the terminal is closed.
         _ if stop.load(Ordering::Relaxed) => Ok(Exit::Interrupted),
         played => played.map(|()| Exit::Done).context("the terminal"),
     }
 }
 
-/// Whether standard output is a terminal to play a replay in.
+/// Checks that standard output is a terminal that can show a replay.
 pub(super) fn check_terminal() -> Result<(), String> {
     if !io::stdout().is_terminal() {
-        Err("standard output is not a terminal to play the replay in".to_owned())
+        Err("standard output is not a terminal, which the replay needs".to_owned())
     } else if !output::terminal_has_codes() {
         let term = env::var_os("TERM").unwrap_or_default();
         Err(format!(
-            "this terminal (TERM={}) cannot play the replay: it only prints lines",
+            "this terminal (TERM={}) cannot show the replay: it only prints lines",
             term.to_string_lossy()
         ))
     } else {
@@ -151,7 +151,7 @@ pub(super) fn check_terminal() -> Result<(), String> {
     }
 }
 
-/// The colours that the environment allows: `COLORTERM`, `TERM`, `NO_COLOR`.
+/// The colours that `COLORTERM`, `TERM` and `NO_COLOR` allow.
 fn paints() -> Paints {
     match supports_color::on(Stream::Stdout) {
         Some(level) if level.has_16m => Paints::True,
@@ -161,7 +161,7 @@ fn paints() -> Paints {
     }
 }
 
-/// Refuses to write where there is something.
+/// Refuses a path that exists.
 pub(super) fn refuse_existing(flag: &str, path: &Path, overwrite: bool) -> Result<(), BadInput> {
     if !overwrite && path.symlink_metadata().is_ok() {
         return Err(exists(flag, path, ", or replace it with --overwrite"));
@@ -169,7 +169,7 @@ pub(super) fn refuse_existing(flag: &str, path: &Path, overwrite: bool) -> Resul
     Ok(())
 }
 
-/// There is something where a flag says to write.
+/// The error for a path that exists.
 fn exists(flag: &str, path: &Path, or_else: &str) -> BadInput {
     BadInput::new(format!(
         "--{flag} = {}: it exists; name another{or_else}",
@@ -177,7 +177,7 @@ fn exists(flag: &str, path: &Path, or_else: &str) -> BadInput {
     ))
 }
 
-/// Writes a file that a flag names.
+/// Writes the file that a flag names.
 pub(super) fn write_file(
     flag: &str,
     path: &Path,
@@ -206,7 +206,7 @@ fn recording(arguments: &ReplayArgs) -> anyhow::Result<Recording> {
     ] {
         if given.is_some() {
             return Err(BadInput::new(format!(
-                "--{flag}: {name} is not a run directory, whose final state could be damaged"
+                "--{flag}: {name} is not a run directory; only the final state of a run can be damaged"
             ))
             .into());
         }
@@ -258,7 +258,7 @@ fn of_run(
     .map_err(|error| about(&error))
 }
 
-/// Refuses what this machine cannot hold, or a page cannot, before a step is computed.
+/// Refuses what does not fit in this machine's memory or on a page, before any step is computed.
 fn check_size(arguments: &ReplayArgs, scenario: &Scenario) -> Result<(), BadInput> {
     let needs = Needs::of_recording(scenario);
     needs.check_memory().map_err(BadInput::new)?;
@@ -270,7 +270,7 @@ fn check_size(arguments: &ReplayArgs, scenario: &Scenario) -> Result<(), BadInpu
     Ok(())
 }
 
-/// The run that the flags ask for: the first trial of their seed.
+/// The run that the flags define: the first trial of their seed.
 fn of_genome(arguments: &ReplayArgs, path: &Path, name: &str) -> anyhow::Result<Recording> {
     let conditions = &arguments.conditions;
     let bytes = read_genome(path)?;

@@ -1,5 +1,5 @@
-//! Settings as flags, made from their table; and the conditions of one run, which a run directory
-//! records and a genome takes from flags.
+//! Settings as flags, generated from their table; and the conditions of one run, which a run
+//! directory records and a genome file gets from flags.
 
 use super::BadInput;
 use clap::builder::{OsStringValueParser, ValueParser};
@@ -54,7 +54,7 @@ impl Args for SettingFlags {
     fn augment_args(command: Command) -> Command {
         command.args(SETTINGS.iter().map(|setting| {
             let arg = arg(setting, with_default(setting.meaning(), setting.default));
-            // A run goes on under its own settings, on any number of threads.
+            // A run is resumed with its own settings, on any number of threads.
             match setting.name {
                 "threads" => arg,
                 _ => arg.conflicts_with("resume"),
@@ -78,14 +78,14 @@ impl FromArgMatches for SettingFlags {
     }
 }
 
-/// Settings that a run of a genome has besides those in its file.
+/// Settings of a run of a genome that are not in the genome file.
 const CONDITIONS: [&str; 5] = ["grid", "robots", "steps", "noise", "seed"];
 
 fn conditions() -> impl Iterator<Item = &'static Setting> {
     SETTINGS.iter().filter(|s| CONDITIONS.contains(&s.name))
 }
 
-/// Flags that go with a genome file.
+/// The flags that a genome file takes.
 #[derive(Clone, Debug, Default)]
 pub struct GenomeConditions(Overrides);
 
@@ -125,7 +125,7 @@ impl FromArgMatches for GenomeConditions {
 }
 
 impl GenomeConditions {
-    /// Refuses flags beside something that records the conditions itself.
+    /// Refuses flags beside a file that records the conditions itself.
     ///
     /// # Errors
     /// [`BadInput`] names the flag.
@@ -133,16 +133,16 @@ impl GenomeConditions {
         match conditions().find(|setting| self.0.place(setting.name).is_some()) {
             None => Ok(()),
             Some(Setting { name, .. }) => Err(BadInput::new(format!(
-                "--{name} and {what} exclude each other; {} says what to run",
+                "--{name} cannot be combined with {what}; {} records its own conditions",
                 path.display()
             ))),
         }
     }
 
-    /// The settings of a run of a genome.
+    /// The settings for a run of a genome.
     ///
     /// # Errors
-    /// [`BadInput`] names the flag, the value and what would be valid.
+    /// [`BadInput`] names the flag, the value and the valid values.
     pub(super) fn settings(&self, encoded: &EncodedGenome<'_>) -> Result<Settings, BadInput> {
         let topology = encoded.topology();
         let mut overrides = self.0.clone();

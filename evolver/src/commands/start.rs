@@ -1,4 +1,4 @@
-//! `evolver start` and `evolver stop`: a robot runs its control loop, or stands.
+//! `evolver start` and `evolver stop`: start and stop a robot's control loop.
 
 use super::port::{PortArgs, failed};
 

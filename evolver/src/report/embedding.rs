@@ -1,4 +1,4 @@
-//! Genomes for those who link them into a firmware or write them to a chip.
+//! Genomes as source code, to link into a firmware, and as images, to write to a chip.
 
 use crate::robot::length_and_crc;
 use ihex::{Record, create_object_file_representation};
@@ -8,21 +8,21 @@ use minimal_surprise_evolution::text::{identifier, shell_path, shell_word};
 use minimal_surprise_slots::Header;
 use std::path::Path;
 
-/// Bytes a line, in source text and Intel HEX.
+/// Bytes per line, in source code and Intel HEX.
 const LINE_BYTES: usize = 16;
 
-/// What a genome is called in source: after a file or a run, and after its bytes, so that several can
-/// be in one program.
+/// A genome's name in source code, from its file or run and its CRC, so that one program can hold
+/// several.
 #[must_use]
 pub fn symbol(name: &str, container: &[u8]) -> String {
     let crc = length_and_crc(container).map_or(0, |(_, crc)| crc);
     format!("minimal_surprise_genome_{}_{crc:08x}", identifier(name)).replace("__", "_")
 }
 
-/// A C header with the container as an array of this name.
+/// A C header with the container as an array with this name.
 #[must_use]
 pub fn c_header(genome: &EncodedGenome<'_>, container: &[u8], symbol: &str) -> String {
-    // As it is: names that differ in case only are two.
+    // Unchanged: names that differ only in case are different.
     let guard = format!("{symbol}_INCLUDED");
     format!(
         "/* A minimal-surprise genome: {}. */\n\
@@ -37,7 +37,7 @@ pub fn c_header(genome: &EncodedGenome<'_>, container: &[u8], symbol: &str) -> S
     )
 }
 
-/// Rust source with the container as a static of this name.
+/// Rust source with the container as a static with this name.
 #[must_use]
 pub fn rust_source(genome: &EncodedGenome<'_>, container: &[u8], symbol: &str) -> String {
     format!(
@@ -57,7 +57,7 @@ fn hex_lines(container: &[u8]) -> String {
     container.chunks(LINE_BYTES).map(line).collect()
 }
 
-/// Intel HEX with the container from an address on; none if it would go beyond 32 bits.
+/// The container as Intel HEX at this address; `None` if it would exceed 32 bits.
 #[must_use]
 pub fn intel_hex(container: &[u8], address: u32) -> Option<String> {
     let mut records = Vec::new();
@@ -65,7 +65,7 @@ pub fn intel_hex(container: &[u8], address: u32) -> Option<String> {
     let mut at = address;
     let mut rest = container;
     while !rest.is_empty() {
-        // A record has 16 bits of address, and does not go across their end.
+        // A record has a 16-bit address and must not cross its end.
         let until_carry = 0x1_0000 - (at as usize & 0xffff);
         let (value, after) = rest.split_at(rest.len().min(LINE_BYTES).min(until_carry));
         let high = (at >> 16) as u16;
@@ -89,11 +89,11 @@ pub fn intel_hex(container: &[u8], address: u32) -> Option<String> {
     create_object_file_representation(&records).ok()
 }
 
-/// A committed genome slot up to the end of the container: what a robot finds that keeps its genomes
-/// in slots. Of its two slots it uses the one with the larger `write_count`, which is 1 or more.
+/// A committed genome slot up to the end of the container, for a robot that keeps genomes in slots.
+/// Of its two slots the robot uses the one with the larger `write_count`, which is 1 or more.
 ///
 /// # Panics
-/// If it is no container: those are longer than four bytes, and shorter than 64 KiB.
+/// If it is not a container: those are longer than four bytes and shorter than 64 KiB.
 #[must_use]
 pub fn slot(container: &[u8], write_count: u32) -> Vec<u8> {
     let (length, crc) = length_and_crc(container).expect("a container has a CRC");
@@ -105,7 +105,7 @@ pub fn slot(container: &[u8], write_count: u32) -> Vec<u8> {
     [&header.front(), container].concat()
 }
 
-/// The command that writes a file as it is to a chip through a debug probe.
+/// The command that writes a file to a chip through a debug probe.
 #[must_use]
 pub fn probe_rs_line(file: &Path, chip: &str, address: u32) -> String {
     format!(

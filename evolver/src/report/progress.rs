@@ -15,16 +15,16 @@ const COLUMNS_FOR_BAR: u16 = 40;
 /// How progress is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum ProgressMode {
-    /// A bar on a terminal that can draw one, lines elsewhere.
+    /// A bar if standard error is a terminal that can draw one, otherwise lines.
     #[default]
     Auto,
-    /// The same: a bar, on standard error, where it can be drawn.
+    /// The same as auto.
     Bar,
-    /// A line a generation, on standard error.
+    /// One line per generation, on standard error.
     Lines,
-    /// A JSON object a generation, on standard output; nothing else is printed there.
+    /// One JSON object per generation, on standard output; nothing else is printed there.
     Json,
-    /// Nothing.
+    /// No progress.
     None,
 }
 
@@ -40,7 +40,7 @@ pub struct Progress {
     population: f64,
 }
 
-/// What progress is shown with.
+/// The display in use.
 #[derive(Debug)]
 pub(super) enum Shown {
     Bar(ProgressBar),
@@ -50,7 +50,7 @@ pub(super) enum Shown {
 }
 
 impl Shown {
-    /// As the mode says and standard error allows; `numbers` stand beside a bar.
+    /// Chooses the display for a mode and standard error; `numbers` stand beside a bar.
     pub(super) fn new(mode: ProgressMode, numbers: &str, of: impl FnOnce() -> ProgressBar) -> Self {
         match mode {
             ProgressMode::Auto | ProgressMode::Bar if output::stderr_is_screen() => {
@@ -63,11 +63,11 @@ impl Shown {
     }
 }
 
-/// Robot-steps from which on a run that is computed in one go takes seconds.
+/// Robot-steps from which a run computed in one go takes seconds.
 const LONG_ROBOT_STEPS: u64 = 2_000_000;
 
-/// Computes a run in one go, showing its steps if it takes seconds; `compute` gets what is to be
-/// called after every step.
+/// Computes a run in one go, and shows its steps if it takes seconds; `compute` gets a callback to
+/// call after every step.
 pub fn computing<T>(scenario: &Scenario, compute: impl FnOnce(&dyn Fn()) -> T) -> T {
     let bar = steps_bar(scenario);
     let computed = compute(&|| bar.inc(1));
@@ -75,8 +75,8 @@ pub fn computing<T>(scenario: &Scenario, compute: impl FnOnce(&dyn Fn()) -> T) -
     computed
 }
 
-/// A bar for a run that is computed in one go, hidden if that is quick. Where no bar can be drawn, a
-/// line says what is going on.
+/// A bar for a run computed in one go, hidden if the run is short. If no bar can be drawn, prints a
+/// line instead.
 #[must_use]
 fn steps_bar(scenario: &Scenario) -> ProgressBar {
     let (robots, steps) = (scenario.robots(), scenario.steps());
@@ -93,7 +93,7 @@ fn steps_bar(scenario: &Scenario) -> ProgressBar {
     }
 }
 
-/// A bar on standard error, hidden where none can be drawn; `numbers` stand beside it.
+/// A bar on standard error, hidden if none can be drawn; `numbers` stand beside it.
 pub(crate) fn bar(bar: ProgressBar, numbers: &str) -> ProgressBar {
     if !output::stderr_is_screen() {
         return ProgressBar::hidden();
@@ -112,7 +112,7 @@ pub(crate) fn bar(bar: ProgressBar, numbers: &str) -> ProgressBar {
 }
 
 impl Progress {
-    /// Starts the clock. `done` generations lie before this process.
+    /// Starts the clock. `done` generations were completed before.
     #[must_use]
     pub fn start(mode: ProgressMode, settings: &Settings, done: u32) -> Self {
         let bar = || ProgressBar::new(settings.generations().into()).with_position(done.into());
@@ -176,7 +176,7 @@ impl Progress {
     }
 }
 
-/// A duration as people say it.
+/// A duration for people.
 pub(crate) fn seconds(duration: Duration) -> String {
     let seconds = duration.as_secs_f64().round() as u64;
     match (seconds / 3600, seconds / 60 % 60, seconds % 60) {

@@ -1,4 +1,4 @@
-//! Tables of re-evaluations and of resilience to damage.
+//! Tables of re-evaluations, and of resilience to damage.
 
 use minimal_surprise_evolution::reevaluation::{Rerun, ResilienceRow, mean, median};
 use minimal_surprise_evolution::run_files::{self, SCHEMA_VERSION};
@@ -12,13 +12,13 @@ use serde_json::{Map, Value, json};
 pub struct Condition {
     /// The conditions.
     pub scenario: Scenario,
-    /// Noise as it was given.
+    /// Noise as given.
     pub noise: f64,
-    /// The runs, by start.
+    /// The runs, one per start.
     pub reruns: Vec<Rerun>,
 }
 
-/// How often each structure gave a run its name; a tie of k counts 1/k for each.
+/// How many runs each structure dominates; a tie of k counts 1/k for each.
 #[must_use]
 pub fn name_counts(reruns: &[Rerun]) -> Vec<(Structure, f64)> {
     let count = |structure| {
@@ -37,7 +37,7 @@ fn fitnesses(reruns: &[Rerun]) -> Vec<f64> {
     reruns.iter().map(|rerun| rerun.fitness).collect()
 }
 
-/// Which way lines run in most of the runs; none where no run has lines.
+/// The orientation of lines in most runs; none if no run has lines.
 fn orientation(reruns: &[Rerun]) -> String {
     if !reruns.iter().any(|r| r.names.contains(&Structure::Line)) {
         return String::new();
@@ -46,7 +46,7 @@ fn orientation(reruns: &[Rerun]) -> String {
     LineOrientation::of_most(&runs).map_or("diverse".to_owned(), |most| most.name().to_owned())
 }
 
-/// A table over conditions for people.
+/// A table of the conditions, for people.
 #[must_use]
 pub fn conditions_text(conditions: &[Condition]) -> String {
     let mut table = super::table(&[
@@ -82,13 +82,13 @@ pub fn conditions_text(conditions: &[Condition]) -> String {
     super::right_aligned(table, &[1, 2, 3, 4])
 }
 
-/// A count without needless decimals.
+/// A count without unnecessary decimals.
 fn plain(count: f64) -> String {
     let text = format!("{count:.2}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// The same for programs.
+/// The conditions as JSON, for programs.
 #[must_use]
 pub fn conditions_json(conditions: &[Condition], seed: u64) -> Value {
     let rows: Vec<Value> = conditions
@@ -130,7 +130,7 @@ pub fn conditions_json(conditions: &[Condition], seed: u64) -> Value {
     object
 }
 
-/// Rows of Tables 7 and 8 for people: mean, and median in brackets where there are several runs.
+/// Rows of Tables 7 and 8 for people: the mean, and for several runs the median in brackets.
 #[must_use]
 pub fn resilience_text(structure: Structure, rows: &[ResilienceRow]) -> String {
     let mut table = super::table(&[
@@ -168,7 +168,7 @@ pub fn resilience_text(structure: Structure, rows: &[ResilienceRow]) -> String {
     )
 }
 
-/// The same for programs, with the values of every run.
+/// The same rows as JSON, with the values of every run.
 #[must_use]
 pub fn resilience_json(structure: Structure, rows: &[ResilienceRow]) -> Value {
     let rows: Vec<Value> = rows

@@ -1,4 +1,4 @@
-//! What a swarm formed, as a picture and a table or as JSON.
+//! What a swarm formed, as a picture and a table, or as JSON.
 
 use super::summary::picture;
 use minimal_surprise_evolution::run_files::{MeasuresOfRun, SCHEMA_VERSION, names};
@@ -8,7 +8,7 @@ use minimal_surprise_sim::{Grid, Pose};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
-/// A state, what it formed, and, where a run is known, how it went.
+/// A state, its structures and, if the run is known, its measures.
 #[derive(Clone, Copy, Debug)]
 pub struct Classified<'a> {
     /// The grid.
@@ -21,13 +21,13 @@ pub struct Classified<'a> {
     pub measures: Option<&'a Measures>,
 }
 
-/// The run's name in words: `lines`, `lines and pairs (tied)`, `nothing`.
+/// The run's dominant structure in words: `lines`, `lines and pairs (tied)`, `nothing`.
 #[must_use]
 pub fn name(found: &Structures) -> String {
     in_words(&found.names())
 }
 
-/// The picture: the robots of the structure that the run is named after stand out.
+/// The picture, with the robots of the dominant structure highlighted.
 #[must_use]
 pub fn highlighted(classified: &Classified<'_>) -> String {
     let Classified {
@@ -41,7 +41,7 @@ pub fn highlighted(classified: &Classified<'_>) -> String {
     })
 }
 
-/// For people.
+/// Text for people.
 #[must_use]
 pub fn text(classified: &Classified<'_>) -> String {
     let Classified {
@@ -114,7 +114,7 @@ fn details(found: &Structures, structure: Structure) -> String {
     }
 }
 
-/// For programs.
+/// JSON for programs.
 #[must_use]
 pub fn json(classified: &Classified<'_>) -> Value {
     let found = classified.found;

@@ -1,4 +1,4 @@
-//! Words and pictures for people at the end of a run, and about a genome.
+//! The summary of a run, and of a genome, for people.
 
 use super::structures::{self, Classified};
 use crate::output::stdout_is_ascii;
@@ -15,10 +15,10 @@ use minimal_surprise_sim::{Grid, Pose};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Rows and columns of the picture when the output is not a terminal.
+/// Most rows and columns of the picture if the output is not a terminal.
 const WITHOUT_TERMINAL: (u16, u16) = (60, 120);
 
-/// How this program was called, for commands that people can copy.
+/// The command that starts this program, for commands that people can copy.
 #[must_use]
 pub fn program() -> &'static str {
     if std::env::var_os("CARGO").is_some() {
@@ -28,14 +28,14 @@ pub fn program() -> &'static str {
     }
 }
 
-/// The swarm's picture, two columns a cell, members as filled arrows (coloured on a terminal), the
-/// others hollow; in ASCII, where both are alike, members are starred. Where it does not fit, a line
-/// that says so.
+/// A picture of the swarm, two columns per cell: members as filled arrows (coloured on a terminal),
+/// the others hollow. In ASCII, where both look alike, members have a star. If it does not fit, a
+/// line that says so.
 #[must_use]
 pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> String {
     let (rows, columns) = Term::stdout().size_checked().unwrap_or(WITHOUT_TERMINAL);
     if 2 * u32::from(grid.width()) + 1 > u32::from(columns) || grid.height() > 4 * rows {
-        return format!("(a {grid} grid is too large for this terminal to be drawn)");
+        return format!("(a {grid} grid is too large to draw in this terminal)");
     }
     let member = Style::new().cyan().bold();
     let star = if stdout_is_ascii() { '*' } else { ' ' };
@@ -53,7 +53,7 @@ pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> S
     lines.join("\n")
 }
 
-/// What an evolution came to, and what to do next.
+/// The result of an evolution, and what to do next.
 #[must_use]
 pub fn evolved(experiment: &Experiment, finding: &EvolutionResult, directory: &Path) -> String {
     let settings = experiment.settings();
@@ -75,12 +75,12 @@ pub fn evolved(experiment: &Experiment, finding: &EvolutionResult, directory: &P
          hash          {hash}\n\
          run           {directory}\n\n\
          next:\n  \
-         watch it               {program} replay {directory}\n  \
+         replay the run         {program} replay {directory}\n  \
          measure the run        {program} classify {directory}\n  \
-         from other starts      {program} evaluate {directory}\n  \
-         look into the genome   {program} inspect {genome}\n  \
+         re-evaluate it         {program} evaluate {directory}\n  \
+         inspect the genome     {program} inspect {genome}\n  \
          evolve it further      {program} evolve --from {genome}\n  \
-         the same run again     {program} evolve {config}\n",
+         repeat the run         {program} evolve {config}\n",
         members = if stdout_is_ascii() {
             "starred"
         } else {
@@ -97,7 +97,7 @@ pub fn evolved(experiment: &Experiment, finding: &EvolutionResult, directory: &P
     )
 }
 
-/// Everything in a genome file.
+/// The contents of a genome file.
 #[must_use]
 pub fn genome(encoded: &EncodedGenome<'_>, file_bytes: usize) -> String {
     let topology = encoded.topology();
@@ -156,7 +156,7 @@ pub fn genome(encoded: &EncodedGenome<'_>, file_bytes: usize) -> String {
     text
 }
 
-/// A table of one network's weights.
+/// A table of a network's weights.
 fn network(text: &mut String, name: &str, shape: Shape, weights: &[i16]) {
     let sizes = format!("{}-{}-{}", shape.inputs(), shape.hidden(), shape.outputs());
     let _ = writeln!(text, "\n{name:<19} {sizes}, {} weights", weights.len());

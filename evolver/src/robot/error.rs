@@ -1,124 +1,127 @@
-//! What can go wrong between this program and a robot.
+//! Errors in talking to a robot.
 
 use super::PortName;
 use minimal_surprise_controller::{KERNEL_ID, KernelId};
 use minimal_surprise_link::Refusal;
 
-/// A port, and what is wrong with it or with what is behind it.
+/// A problem with a port or the robot behind it.
 #[derive(Debug, thiserror::Error)]
 #[error("--port = {port}: {problem}{}", left.as_ref().map_or(String::new(), |left| format!("; {left}")))]
 pub struct RobotError {
     /// The port.
     pub port: PortName,
-    /// What is wrong.
+    /// The problem.
     pub problem: Problem,
-    /// How the robot is left and what to do about it, if not as it was found.
+    /// The robot's state and what to do about it, if it differs from the state before the command.
     pub left: Option<String>,
 }
 
-/// What is wrong.
+/// A problem with a port or a robot.
 #[derive(Debug, thiserror::Error)]
 pub enum Problem {
-    /// Nothing has this name.
+    /// There is no port with this name.
     #[error("no such port; {}", present(ports))]
     NoSuchPort {
-        /// The ports that there are.
+        /// The existing ports.
         ports: Vec<String>,
     },
-    /// A file, a folder or another device has this name.
-    #[error("a file, folder or device that is no serial port; {}", present(ports))]
+    /// The name is that of a file, folder or other device.
+    #[error(
+        "not a serial port, but a file, folder or other device; {}",
+        present(ports)
+    )]
     NotAPort {
-        /// The ports that there are.
+        /// The existing ports.
         ports: Vec<String>,
     },
-    /// It cannot be handed to the operating system.
+    /// The name cannot be passed to the serial library.
     #[error(
         "its name is not UTF-8, and ports with such names cannot be opened; give a symbolic link to \
          it another name, and use that"
     )]
     NotUtf8,
-    /// Another program has it.
+    /// Another program uses the port.
     #[error("the port is in use by another program; close that first")]
     InUse,
-    /// The operating system does not give it.
+    /// The operating system refuses to open the port.
     #[error("the port cannot be opened: {0}")]
     NotOpened(serialport::Error),
-    /// Not a byte has come.
+    /// Nothing was received.
     #[error(
         "silence for {seconds:.1} s; expected a robot that is switched on, at {baud} baud (--baud){reader}{RESTARTS}"
     )]
     Silent {
-        /// How long it was waited for.
+        /// How long the program waited.
         seconds: f64,
-        /// The speed.
+        /// The baud rate.
         baud: u32,
-        /// Who else may have read what came.
+        /// Whether another program may have read the answer.
         reader: OtherReader,
     },
-    /// Something has come, but nothing that a robot says.
+    /// Bytes were received, but no answer of a robot.
     #[error(
         "another device is talking: {heard}; expected a robot at {baud} baud (--baud){reader}{RESTARTS}"
     )]
     OtherDevice {
-        /// What was heard.
+        /// What was received.
         heard: Heard,
-        /// The speed.
+        /// The baud rate.
         baud: u32,
-        /// Who else may have read what came.
+        /// Whether another program may have read the answer.
         reader: OtherReader,
     },
-    /// The robot computes differently.
+    /// The robot uses different arithmetic.
     #[error("the robot is kernel {robot}, this program is kernel {KERNEL_ID}; update one of them")]
     OtherKernel {
-        /// The robot's.
+        /// The robot's kernel.
         robot: KernelId,
     },
-    /// The port has gone.
+    /// The line failed, for example because it was unplugged.
     #[error("the line broke while the robot was {doing}: {error}{}", doing.consequence())]
     Broken {
-        /// What was going on.
+        /// What the robot was doing.
         doing: Doing,
-        /// What the operating system says.
+        /// The operating system's error.
         error: std::io::Error,
     },
-    /// The robot has answered before, and does no longer.
-    #[error("no answer any more, while the robot was {doing}{}{reader}", doing.consequence())]
+    /// The robot answered before, but no longer does.
+    #[error("the robot stopped answering while it was {doing}{}{reader}", doing.consequence())]
     Unanswered {
-        /// What was going on.
+        /// What the robot was doing.
         doing: Doing,
-        /// Who else may have read what came.
+        /// Whether another program may have read the answer.
         reader: OtherReader,
     },
-    /// The user has asked for an end.
+    /// The user interrupted the command.
     #[error("interrupted while the robot was {doing}{}", doing.consequence())]
     Interrupted {
-        /// What was going on.
+        /// What the robot was doing.
         doing: Doing,
     },
-    /// The robot says no.
+    /// The robot refused the request.
     #[error("refused while the robot was {doing}: {refusal}{}", doing.consequence_of(*refusal))]
     Refused {
-        /// What was going on.
+        /// What the robot was doing.
         doing: Doing,
-        /// Its reason.
+        /// The robot's reason.
         refusal: Refusal,
     },
-    /// An answer to another question.
-    #[error("an answer that does not belong to the question, while the robot was {doing}")]
+    /// The answer is not to the request.
+    #[error("an answer to another request while the robot was {doing}")]
     OtherAnswer {
-        /// What was going on.
+        /// What the robot was doing.
         doing: Doing,
     },
-    /// Numbers that no robot can have.
+    /// The robot reports values that are impossible.
     #[error("the robot reports impossible {what}")]
     Impossible {
-        /// Which, and why.
+        /// The values, and why they are impossible.
         what: String,
     },
-    /// It says that it has done it, and has not.
+    /// The robot confirmed the genome, but does not run it.
     #[error("the robot confirmed the genome, but runs {runs}; run the command again")]
     NotInUse {
-        /// What it runs.
+        /// The genome that it runs.
         runs: String,
     },
 }
@@ -127,12 +130,12 @@ pub enum Problem {
 const RESTARTS: &str =
     "; a board that restarts when its port is opened may need longer, as with --wait 10";
 
-/// Another program that reads the same port.
+/// Whether another program reads the same port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OtherReader {
-    /// There may be one.
+    /// Possibly.
     Possible,
-    /// Bytes had arrived, and were gone when they were to be read.
+    /// Certainly: bytes had arrived, but were gone when the program read them.
     Certain,
 }
 
@@ -148,35 +151,35 @@ impl std::fmt::Display for OtherReader {
 /// What a robot is asked to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doing {
-    /// Saying who it is.
+    /// Identify itself.
     Identifying,
-    /// Starting, stopping, or forgetting the past.
+    /// Start, stop, or reset its controller.
     Switching,
-    /// Being written to.
+    /// Receive a genome.
     Receiving,
-    /// Taking a genome into use.
+    /// Put a genome into use.
     Committing,
-    /// Single steps.
+    /// Make single steps.
     Stepping,
-    /// Telling how it is going.
+    /// Report its telemetry.
     Reporting,
 }
 
 impl Doing {
-    /// What this means for the robot, if that is not plain.
+    /// The consequence for the robot, if it is not obvious.
     fn consequence(self) -> &'static str {
         match self {
-            Self::Receiving => "; it keeps the genome that it had",
+            Self::Receiving => "; it keeps its old genome",
             Self::Committing => {
-                "; it has either the genome that it had or the new one: run the command again"
+                "; it has either its old genome or the new one: run the command again"
             }
             _ => "",
         }
     }
 
-    /// The same after a refusal. A genome that is refused is not in use. But of a lost session it is
-    /// not known whether the request had been carried out before, and a memory that could not be
-    /// read may have the genome after a restart.
+    /// The consequence after a refusal. A refused genome is not in use. But after a lost session,
+    /// the request may have been carried out already; and a memory that could not be read may have
+    /// the genome after a restart.
     fn consequence_of(self, refusal: Refusal) -> &'static str {
         match (self, refusal) {
             (Self::Committing, Refusal::NoSession | Refusal::Flash) => self.consequence(),
@@ -199,21 +202,21 @@ impl std::fmt::Display for Doing {
     }
 }
 
-/// What came instead of an answer.
+/// What was received instead of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// What was sent.
+    /// The bytes that were sent.
     Echo,
-    /// A message of another version of the protocol.
+    /// A message in another version of the protocol.
     OtherVersion {
-        /// That version.
+        /// The version.
         found: u8,
     },
-    /// Frames, but no answer.
+    /// Frames that are not answers.
     Frames,
-    /// Bytes.
+    /// Bytes without a frame.
     Bytes {
-        /// So many.
+        /// How many.
         count: u64,
     },
 }
@@ -221,21 +224,21 @@ pub enum Heard {
 impl std::fmt::Display for Heard {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Echo => write!(f, "it only sends back what it is sent"),
+            Self::Echo => write!(f, "it only echoes what it is sent"),
             Self::OtherVersion { found } => write!(
                 f,
                 "it speaks version {found} of the protocol, this program version {}",
                 minimal_surprise_link::PROTOCOL_VERSION
             ),
-            Self::Frames => write!(f, "its frames are no answers"),
-            Self::Bytes { count } => write!(f, "{count} bytes without a message came from it"),
+            Self::Frames => write!(f, "its frames are not answers"),
+            Self::Bytes { count } => write!(f, "it sent {count} bytes without a message"),
         }
     }
 }
 
 fn present(ports: &[String]) -> String {
     match ports {
-        [] => "none is found on this machine".to_owned(),
-        ports => format!("on this machine are {}", ports.join(", ")),
+        [] => "this machine has no serial ports".to_owned(),
+        ports => format!("this machine has {}", ports.join(", ")),
     }
 }

@@ -1,29 +1,29 @@
-//! A robot that is stopped for some work, and afterwards is as it was found.
+//! A robot that is stopped for some work and put back into its state afterwards.
 
 use super::{Robot, RobotError};
 use std::sync::Mutex;
 
-/// What to say about a robot that is stopped when the program ends at once.
+/// The message to print if the program exits while it has stopped a robot.
 static STANDING: Mutex<Option<String>> = Mutex::new(None);
 
-/// How a robot is left.
+/// The state of the robot after the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Afterwards {
-    /// It runs if the work was done; as it was found if not.
+    /// Running if the work succeeded, otherwise as before.
     Runs,
-    /// As it was found, but its controller starts anew: the work has used it.
+    /// As before, but with a reset controller, since the work has used it.
     StartsAnew,
 }
 
-/// How the robot stands and what starts it, if one is stopped for some work now.
+/// What to tell the user if the program exits now: that a robot is stopped, and what starts it.
 #[must_use]
 pub fn standing() -> Option<String> {
     STANDING.lock().ok().and_then(|words| words.clone())
 }
 
 impl Robot {
-    /// Stops the robot for some work. Whatever comes of it, an interruption and a panic too, the
-    /// robot is left as it was found, or [`RobotError::left`] says how it stands, and that
+    /// Stops the robot for some work. Afterwards, even after an interruption or a panic, the robot
+    /// is in its former state, or [`RobotError::left`] gives its state and says that
     /// `start_command` starts it.
     ///
     /// # Errors
@@ -35,7 +35,7 @@ impl Robot {
         work: impl FnOnce(&mut Self) -> Result<T, RobotError>,
     ) -> Result<T, RobotError> {
         let was_running = self.identity.running;
-        let words = format!("the robot may be standing now; start it with: {start_command}");
+        let words = format!("the robot may be stopped now; start it with: {start_command}");
         set_standing(was_running.then(|| words.clone()));
         let mut held = Held {
             runs: was_running,
@@ -49,7 +49,7 @@ impl Robot {
             held.runs = true;
         }
         if let Err(error) = held.put_back() {
-            // The first error is the reason of the others.
+            // The first error caused the others.
             let mut error = done.err().unwrap_or(error);
             error.left = held.runs.then(|| held.words.clone());
             done = Err(error);
@@ -60,7 +60,7 @@ impl Robot {
 
 struct Held<'r> {
     robot: &'r mut Robot,
-    /// Whether it is to run afterwards.
+    /// Whether the robot should run afterwards.
     runs: bool,
     starts_anew: bool,
     words: String,
@@ -73,7 +73,7 @@ impl Held<'_> {
         self.robot.finish();
         let mut back = Ok(());
         if self.runs || self.starts_anew {
-            // In a new conversation: it may have been restarted.
+            // In a new conversation: the robot may have restarted.
             back = self.robot.identify().map(|_| ());
             if self.starts_anew && !self.robot.identity.running {
                 back = back.and_then(|()| self.robot.reset());
@@ -88,7 +88,7 @@ impl Held<'_> {
 }
 
 impl Drop for Held<'_> {
-    /// In a panic.
+    /// After a panic.
     fn drop(&mut self) {
         if !self.is_back && self.put_back().is_err() && self.runs {
             tell!("{}", self.words);

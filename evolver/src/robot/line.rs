@@ -1,4 +1,4 @@
-//! One serial port, and one question after another over it.
+//! One serial port, and one request after another over it.
 
 use super::error::{Doing, Heard, OtherReader, Problem, RobotError};
 use minimal_surprise_evolution::text::terminal_path;
@@ -11,15 +11,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Longest that sending a request may take; at 9,600 baud the longest takes 160 ms.
+/// Time limit for sending a request; at 9,600 baud the longest takes 160 ms.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
-/// Pause before a port is tried again that was ready and then was not.
+/// Pause before retrying a port that reported to be ready but was not.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// For what is not to be interrupted.
+/// For operations that must not be interrupted.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
-/// How a user names a port.
+/// A port, as the user names it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PortName(pub PathBuf);
 
@@ -35,19 +35,19 @@ pub(super) struct Line {
     baud: u32,
     port: Box<dyn SerialPort>,
     client: Client,
-    /// Bytes that have come in this conversation.
+    /// Bytes received in this conversation.
     received: u64,
-    /// Whether an answer has ever come.
+    /// Whether any answer was ever received.
     answered: bool,
-    /// Whether bytes that had come were gone when they were to be read.
+    /// Whether bytes had arrived but were gone when they were read.
     shared: bool,
-    /// Set when questions are to end.
+    /// Set to stop sending requests.
     stop: &'static AtomicBool,
 }
 
 impl Line {
-    /// Opens the port; says nothing yet. The first question is asked for as long as `wait`, and no
-    /// question is asked any more when `stop` is set.
+    /// Opens the port; sends nothing yet. The first request is repeated for as long as `wait`. Once
+    /// `stop` is set, no request is sent any more.
     pub(super) fn open(
         name: &PortName,
         baud: u32,
@@ -63,14 +63,14 @@ impl Line {
         if path.is_file() || path.is_dir() {
             return Err(about(Problem::NotAPort { ports: ports() }));
         }
-        // The serial library takes text.
+        // The serial library takes UTF-8 only.
         let text = path.to_str().ok_or_else(|| about(Problem::NotUtf8))?;
         let port = open_port(text, baud).map_err(|error| {
             about(match error.kind {
                 serialport::ErrorKind::Io(ErrorKind::NotFound) => {
                     Problem::NoSuchPort { ports: ports() }
                 }
-                // Also said on Windows of a port that is not there.
+                // On Windows, also the error for a missing port.
                 serialport::ErrorKind::NoDevice if cfg!(unix) => Problem::InUse,
                 serialport::ErrorKind::Unknown if is_another_device(path) => {
                     Problem::NotAPort { ports: ports() }
@@ -92,18 +92,18 @@ impl Line {
         })
     }
 
-    /// From here on nothing is interrupted.
+    /// Ignores `stop` from here on.
     pub(super) fn finish(&mut self) {
         self.stop = &NEVER;
     }
 
-    /// Begins another conversation.
+    /// Starts a new conversation.
     pub(super) fn start_over(&mut self) {
         self.client = Client::new(rand::random(), Client::ATTEMPTS_MAX);
         self.received = 0;
     }
 
-    /// Asks, as often as it takes, until the answer is there; `take` gets out of it what is wanted.
+    /// Sends a request, repeatedly if necessary, until it is answered; `take` extracts the result.
     pub(super) fn ask<T>(
         &mut self,
         doing: Doing,
@@ -117,7 +117,7 @@ impl Line {
         let started = Instant::now();
         let mut bytes = match self.client.request(request) {
             Ok(bytes) => bytes.to_vec(),
-            // Every question is asked to its end, and a conversation has more than any run needs.
+            // A request is always completed, and a conversation allows more than any run needs.
             Err(error) => {
                 let error = io::Error::other(error);
                 return Err(self.about(Problem::Broken { doing, error }));
@@ -198,7 +198,7 @@ impl Line {
         while !bytes.is_empty() {
             match self.by(deadline, |port| port.write(bytes)) {
                 Ok(Some(count)) => bytes = &bytes[count..],
-                // A line that takes nothing is one that does not answer either.
+                // A line that accepts nothing does not answer either.
                 Ok(None) => break,
                 Err(error) => return Err(self.broken(doing, error)),
             }
@@ -206,7 +206,7 @@ impl Line {
         Ok(())
     }
 
-    /// Bytes that have come; none at the deadline.
+    /// Bytes received; none at the deadline.
     fn receive(
         &mut self,
         doing: Doing,
@@ -223,7 +223,7 @@ impl Line {
         read.map_err(|error| self.broken(doing, error))
     }
 
-    /// Reads or writes as soon as that can be done; none at the deadline.
+    /// Reads or writes as soon as possible; nothing at the deadline.
     fn by(
         &mut self,
         deadline: Instant,
@@ -250,8 +250,8 @@ impl Line {
     }
 }
 
-/// Whether a port that was ready has taken and given nothing. A line that was pulled does the same
-/// and is then not ready but broken.
+/// Whether a port that was ready transferred nothing. An unplugged line does the same, but then
+/// reports an error instead of being ready.
 fn is_not_ready(transferred: &io::Result<usize>) -> bool {
     match transferred {
         Ok(count) => *count == 0,
@@ -259,12 +259,12 @@ fn is_not_ready(transferred: &io::Result<usize>) -> bool {
     }
 }
 
-/// A port that never waits in a read or a write, only before it: where a byte has arrived, another
-/// program may be quicker, and then waiting for the next one has no limit.
+/// A port that never waits during a read or write, only before it. Otherwise, if another program
+/// took the byte that had arrived, the read would wait for the next one without a time limit.
 #[cfg(unix)]
 fn open_port(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
     let port = serialport::new(name, baud).open_native()?;
-    // The setting is that of the open file, which the duplicate shares.
+    // The setting belongs to the open file, which the duplicate shares.
     let set = filedescriptor::FileDescriptor::dup(&port)
         .and_then(|mut duplicate| duplicate.set_non_blocking(true));
     match set {
@@ -276,7 +276,7 @@ fn open_port(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
     }
 }
 
-/// Whether what has this name is there and is no terminal line.
+/// Whether this name exists and is not a terminal line.
 #[cfg(unix)]
 fn is_another_device(path: &Path) -> bool {
     use nix::libc::{O_NOCTTY, O_NONBLOCK};
@@ -298,7 +298,7 @@ fn open_port(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
     serialport::new(name, baud).timeout(SEND_TIMEOUT).open()
 }
 
-/// Whether the robot has lost the conversation.
+/// Whether the robot has lost the session.
 pub(super) fn is_lost_session(problem: &Problem) -> bool {
     matches!(
         problem,
@@ -309,7 +309,7 @@ pub(super) fn is_lost_session(problem: &Problem) -> bool {
     )
 }
 
-/// The names of the ports that the operating system tells of.
+/// The names of the ports that the operating system lists.
 fn ports() -> Vec<String> {
     let ports = serialport::available_ports().unwrap_or_default();
     ports.into_iter().map(|port| port.port_name).collect()

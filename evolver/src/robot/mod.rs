@@ -1,6 +1,7 @@
-//! A robot on a serial line: who it is, writing its genome, steps, telemetry.
+//! A robot on a serial line: identifying it, writing its genome, steps, telemetry.
 //!
-//! Here are the port, the clock and the retries that [`minimal_surprise_link`] leaves to the host.
+//! This module adds the port, the clock and the retries that [`minimal_surprise_link`] leaves to
+//! the host.
 
 mod error;
 mod held;
@@ -22,24 +23,24 @@ use std::fmt;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// Who the robot is and what it runs.
+/// A robot's firmware, and what it runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity {
     /// Name and version of the firmware.
     pub firmware: String,
-    /// The arithmetic that it computes with.
+    /// Its arithmetic.
     pub kernel: KernelId,
     /// The genome in use.
     pub genome: GenomeInUse,
     /// Whether the control loop runs.
     pub running: bool,
-    /// What is wrong.
+    /// Its faults.
     pub faults: Faults,
 }
 
 impl fmt::Display for Identity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let state = if self.running { "running" } else { "standing" };
+        let state = if self.running { "running" } else { "stopped" };
         let genome = describe(self.genome);
         write!(f, "{}, {state}, {genome}", self.firmware)?;
         for fault in fault_names(self.faults) {
@@ -49,7 +50,7 @@ impl fmt::Display for Identity {
     }
 }
 
-/// A genome in use, in words.
+/// The genome in use, in words.
 #[must_use]
 pub fn describe(genome: GenomeInUse) -> String {
     match genome {
@@ -63,7 +64,7 @@ pub fn describe(genome: GenomeInUse) -> String {
     }
 }
 
-/// What is wrong, in words.
+/// The faults, in words.
 #[must_use]
 pub fn fault_names(faults: Faults) -> Vec<&'static str> {
     let names = [
@@ -79,12 +80,12 @@ pub fn fault_names(faults: Faults) -> Vec<&'static str> {
     let unknown = names
         .iter()
         .fold(faults.0, |bits, (fault, _)| bits & !fault.0);
-    let unknown = (unknown != 0).then_some("a fault unknown to this program");
+    let unknown = (unknown != 0).then_some("an unknown fault");
     set.map(|(_, name)| name).chain(unknown).collect()
 }
 
-/// Length and CRC of a container, as a robot names the genome in use; none of bytes that cannot be
-/// one.
+/// Length and CRC of a container, by which a robot identifies the genome in use; `None` for bytes
+/// that cannot be a container.
 #[must_use]
 pub fn length_and_crc(container: &[u8]) -> Option<(u16, u32)> {
     let (_, crc) = container.split_last_chunk()?;
@@ -101,22 +102,22 @@ pub fn is_in_use(genome: GenomeInUse, container: &[u8]) -> bool {
     }
 }
 
-/// A robot that has said who it is.
+/// A robot that has identified itself.
 pub struct Robot {
     line: Line,
     identity: Identity,
-    /// Steps asked for since the last reset.
+    /// Steps requested since the last reset.
     steps: u64,
-    /// What it reported last in this conversation.
+    /// Its last report in this conversation.
     reported: Option<Surprise>,
 }
 
 impl Robot {
-    /// Opens the port and asks who is there, for as long as `wait`. When `stop` is set, the robot is
-    /// asked nothing more, except to be put back as it was found.
+    /// Opens the port and asks the robot to identify itself, for as long as `wait`. Once `stop` is
+    /// set, only the requests that restore the robot's state are sent.
     ///
     /// # Errors
-    /// [`RobotError`] if there is no such port, nobody answers, or somebody else does.
+    /// [`RobotError`] if there is no such port, nothing answers, or another device does.
     pub fn connect(
         port: &PortName,
         baud: u32,
@@ -133,18 +134,18 @@ impl Robot {
         })
     }
 
-    /// From here on nothing is interrupted.
+    /// Ignores `stop` from here on.
     fn finish(&mut self) {
         self.line.finish();
     }
 
-    /// What it said when it was asked last.
+    /// Its last identification.
     #[must_use]
     pub fn identity(&self) -> &Identity {
         &self.identity
     }
 
-    /// Asks again who is there, in a new conversation.
+    /// Identifies it again, in a new conversation.
     ///
     /// # Errors
     /// [`RobotError`].
@@ -155,7 +156,7 @@ impl Robot {
         Ok(&self.identity)
     }
 
-    /// Refuses a robot that computes differently.
+    /// Refuses a robot that uses different arithmetic.
     ///
     /// # Errors
     /// [`Problem::OtherKernel`].
@@ -168,13 +169,13 @@ impl Robot {
         }
     }
 
-    /// Writes a genome into the slot that is not in use and has the robot run it, calling `written`
-    /// with the bytes that it has. The robot has to stand. It may be interrupted until the genome is
-    /// complete.
+    /// Writes a genome into the unused slot and makes the robot run it. Calls `written` with the
+    /// number of bytes received so far. The robot must be stopped. The transfer can be interrupted
+    /// until the genome is complete.
     ///
     /// # Errors
-    /// [`RobotError`]; the robot then has the genome that it had, except after
-    /// [`Doing::Committing`], when it is not known.
+    /// [`RobotError`]; the robot then keeps its genome, except after [`Doing::Committing`], when it
+    /// has either genome.
     pub fn write(
         &mut self,
         container: &[u8],
@@ -200,7 +201,7 @@ impl Robot {
                 _ => None,
             });
         match committed {
-            // The answer may be what got lost: the robot knows.
+            // The answer may have been lost: ask the robot.
             Err(error) if matches!(error.problem, Problem::Unanswered { .. }) => {
                 self.identify().map_err(|_| error)?;
             }
@@ -217,7 +218,7 @@ impl Robot {
         }
     }
 
-    /// Runs the control loop.
+    /// Starts the control loop.
     ///
     /// # Errors
     /// [`RobotError`].
@@ -225,7 +226,7 @@ impl Robot {
         self.done(Doing::Switching, &Request::Start)
     }
 
-    /// Stops motors and control loop.
+    /// Stops the motors and the control loop.
     ///
     /// # Errors
     /// [`RobotError`].
@@ -233,7 +234,7 @@ impl Robot {
         self.done(Doing::Switching, &Request::Stop)
     }
 
-    /// Has it forget the past. The robot has to stand.
+    /// Resets the controller. The robot must be stopped.
     ///
     /// # Errors
     /// [`RobotError`].
@@ -242,7 +243,7 @@ impl Robot {
         self.done(Doing::Switching, &Request::Reset)
     }
 
-    /// One control step with these readings. The robot has to stand and to have been reset.
+    /// Makes one control step with these readings. The robot must be stopped and have been reset.
     ///
     /// # Errors
     /// [`RobotError`].
@@ -259,7 +260,7 @@ impl Robot {
         Ok(stepped)
     }
 
-    /// How it is going; none if the robot was restarted since it was asked last.
+    /// Its telemetry; `None` if the robot restarted since the last request.
     ///
     /// # Errors
     /// [`RobotError`].
@@ -294,14 +295,14 @@ impl Robot {
         checked.map_err(|what| self.line.about(Problem::Impossible { what }))
     }
 
-    /// Asks for something of which nothing is to be said but that it is done.
+    /// Sends a request whose answer only confirms it.
     fn done(&mut self, doing: Doing, request: &Request<'_>) -> Result<(), RobotError> {
         self.line
             .ask(doing, request, |reply| (reply == Reply::Done).then_some(()))
     }
 }
 
-/// What happened between two reports; none if the counts began anew.
+/// The difference between two reports; `None` if the counts were reset in between.
 #[must_use]
 pub fn since(before: Surprise, now: Surprise) -> Option<Surprise> {
     Some(Surprise {
@@ -330,7 +331,7 @@ fn identify(line: &mut Line) -> Result<Identity, RobotError> {
     identity.map_err(|what| line.about(Problem::Impossible { what }))
 }
 
-/// Name and version, with nothing that a terminal would take for commands.
+/// Name and version, without terminal control characters.
 fn printable(firmware: &str, version: &str) -> String {
     terminal(&format!("{firmware} {version}"))
 }

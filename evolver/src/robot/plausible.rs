@@ -1,20 +1,19 @@
-//! Whether what a robot reports can be. Nothing is computed with numbers that cannot.
+//! Checks whether a robot's reports are possible, before anything is computed from them.
 //!
-//! Not checked, since nothing is computed with them: the write count of a commit, after which the
-//! robot is asked which genome is in use; the counters of the line, any value of which can be, and
-//! which are shown as they are; the offset that a refused chunk should have had, which the message
-//! names.
+//! Not checked, since nothing is computed from them: the write count of a commit, after which the
+//! robot is asked for the genome in use; the counters of the line, which can have any value and are
+//! shown unchanged; the offset that a refused chunk should have had, which the message names.
 
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_controller::{KERNEL_ID, Surprise};
 use minimal_surprise_link::{FIRMWARE_BYTES_MAX, GenomeInUse, Identity, Report, VERSION_BYTES_MAX};
 
-/// Most bits that are sensed in a step: those of a reading.
+/// Most bits sensed in a step: those of a reading.
 const BITS_A_STEP_MAX: u64 = u16::BITS as u64;
 /// A container is longer than its CRC.
 const CRC_BYTES: u16 = 4;
 
-/// What is impossible about an identity, in words.
+/// Refuses an impossible identity, and says why.
 pub(super) fn check_identity(identity: &Identity<'_>) -> Result<(), String> {
     for (what, text, most) in [
         ("firmware name", identity.firmware, FIRMWARE_BYTES_MAX),
@@ -36,7 +35,7 @@ pub(super) fn check_identity(identity: &Identity<'_>) -> Result<(), String> {
     else {
         return Ok(());
     };
-    // What another kernel's genomes need is not known here.
+    // The needs of another kernel's genomes are unknown here.
     let most = match identity.kernel {
         KERNEL_ID => CONTAINER_BYTES_MAX as u16,
         _ => u16::MAX,
@@ -52,7 +51,7 @@ pub(super) fn check_identity(identity: &Identity<'_>) -> Result<(), String> {
     }
 }
 
-/// What is impossible about a surprise, in words, when so many steps were made; or an unknown number.
+/// Refuses an impossible surprise after this many steps (if known), and says why.
 pub(super) fn check_surprise(surprise: Surprise, steps: Option<u64>) -> Result<(), String> {
     let Surprise {
         mispredicted_bits: mispredicted,
@@ -71,10 +70,10 @@ pub(super) fn check_surprise(surprise: Surprise, steps: Option<u64>) -> Result<(
     }
 }
 
-/// What is impossible about a report, in words.
+/// Refuses an impossible report, and says why.
 pub(super) fn check_report(report: &Report) -> Result<(), String> {
     let counts = [report.straight, report.turned_left, report.turned_right];
-    // A counter that has reached its largest value has stopped counting.
+    // A counter stops at its largest value.
     let steps = (!counts.contains(&u32::MAX)).then(|| counts.map(u64::from).iter().sum());
     check_surprise(report.surprise, steps)?;
     if report.held_back > report.straight {
@@ -102,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_bits_are_mispredicted_than_seen_and_no_more_seen_than_sensed() {
+    fn bits_mispredicted_cannot_exceed_bits_seen_nor_those_the_bits_sensed() {
         for possible in [(0, 0), (16, 16), (0, 48)] {
             assert_eq!(
                 check_surprise(surprise(possible.0, possible.1), Some(3)),

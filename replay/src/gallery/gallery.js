@@ -5,7 +5,7 @@ const structureOf = (run) => run.names.join(' and ') || 'no structure';
 const cards = [];
 const chosen = { structure: '', sort: 'fitness', grid: '', model: '', prediction: '', noise: '' };
 
-/* A card for every run; drawn when it comes into sight. */
+/* A card for every run; drawn when it scrolls into view. */
 function makeCards(bytes) {
   let at = 0;
   const numbers = (Kind, count) => {
@@ -82,7 +82,7 @@ const ORDERS = {
   seed: (a, b) => byText(a.seed, b.seed),
 };
 
-/* Shows the runs that were chosen, in order. */
+/* Shows the selected runs, in order. */
 function show() {
   const shown = cards.filter(({ run }) => fits(run));
   shown.sort((a, b) => ORDERS[chosen.sort](a.run, b.run) || byText(a.run.page, b.run.page));
@@ -125,7 +125,7 @@ function makeChoices() {
     element(key).parentElement.hidden = values.length < 2;
   }
   for (const key of [...CHOICES, 'sort']) element(key).addEventListener('change', (event) => choose(key, event.target.value));
-  // What was chosen is in the address, so that going back from a replay finds it again.
+  // The choices are in the address, so that going back from a replay restores them.
   const given = new URLSearchParams(location.hash.slice(1));
   for (const key of CHOICES) {
     if ([...element(key).options].some(({ value }) => value === given.get(key))) chosen[key] = given.get(key);

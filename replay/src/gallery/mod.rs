@@ -1,7 +1,7 @@
-//! A gallery: one page with the final state of every run, from which the replay of each opens.
+//! A gallery: one page with the final state of every run, each linked to its replay.
 //!
-//! It is a folder of pages, `index.html` and one a run, so that it opens at once however many runs
-//! there are.
+//! It is a folder of pages, `index.html` and one per run, so that it opens quickly however many
+//! runs it has.
 
 use super::page::html::Document;
 use super::page::{self, PageError, encoding, prediction_name};
@@ -28,46 +28,47 @@ use std::path::{Path, PathBuf};
 
 /// The first page of a gallery.
 pub const INDEX: &str = "index.html";
-/// Says that a folder holds a gallery.
+/// Marks a folder as a gallery.
 const MARKER: &str = ".evolver-gallery";
-/// How many folders deep runs are looked for.
+/// How many folders deep runs are searched for.
 const DEPTH: usize = 3;
 
-/// A gallery cannot be written.
+/// A gallery could not be written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum GalleryError {
     /// A run cannot be read.
     #[error(transparent)]
     Run(#[from] ReadRunError),
-    /// A run cannot be shown.
+    /// A run does not fit on a page.
     #[error("{}: {error}", path.display())]
     Page {
         /// The run directory.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         error: PageError,
     },
-    /// A run cannot be run again.
+    /// A run could not be repeated.
     #[error("{}: {error}", path.display())]
     World {
         /// The run directory.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         error: minimal_surprise_sim::WorldError,
     },
-    /// There is nothing to show.
+    /// There are no complete runs.
     #[error("no complete run in {}", list(.0))]
     Empty(Vec<PathBuf>),
     /// Every run is damaged.
     #[error("{}", causes(.0))]
     Damaged(DamagedRuns),
-    /// There is something already.
+    /// The folder exists.
     #[error("{} exists; name another folder, or replace its pages with --overwrite", .0.display())]
     Exists(PathBuf),
-    /// It takes more than this machine has.
+    /// The machine has too little memory.
     #[error(transparent)]
     TooMuch(#[from] TooMuch),
-    /// A file or folder cannot be used.
+    /// A file or folder could not be used.
     #[error(transparent)]
     File(#[from] FileError),
 }
@@ -75,27 +76,27 @@ pub enum GalleryError {
 /// A gallery that has been written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// Its first page.
+    /// The first page.
     pub index: PathBuf,
-    /// Runs in it.
+    /// Number of runs.
     pub runs: usize,
-    /// Run directories left out because their runs have not ended.
+    /// Number of run directories left out because their runs have not ended.
     pub unfinished: usize,
-    /// Runs left out because they are damaged, and folders that cannot be looked into.
+    /// Runs left out because they are damaged, and folders that could not be read.
     pub damaged: DamagedRuns,
-    /// Size of all its pages.
+    /// Size of all pages.
     pub bytes: u64,
-    /// Whether another process wrote it, after this one had begun.
+    /// Whether another process wrote the gallery in the meantime.
     pub by_another: bool,
 }
 
-/// Writes the gallery of all runs in some directories: run directories, or directories that hold
-/// run directories. A new gallery is there as a whole or not at all, and if another process writes
-/// one meanwhile, that one stays: the same runs give the same pages. In a folder that exists, pages
-/// are replaced one by one, and other files stay.
+/// Writes the gallery of all runs in some directories: run directories, or directories that contain
+/// run directories. A new gallery is published as a whole or not at all. If another process
+/// publishes one in the meantime, that one is kept: the same runs give the same pages. In an
+/// existing folder, pages are replaced one by one and other files are kept.
 ///
 /// # Errors
-/// [`GalleryError`]; a new folder is then not there.
+/// [`GalleryError`]; a new folder is then not published.
 pub fn write(
     directories: &[PathBuf],
     out: &Path,
@@ -128,7 +129,7 @@ pub fn write(
         error => error,
     })?;
     match new.publish() {
-        // Another process has made something of this name meanwhile.
+        // Another process has created something with this name in the meantime.
         Err(error) if error.is_exists() => match existing {
             Existing::Replace => into_existing(),
             Existing::Refuse if is_marked(out)? => Ok(Written {
@@ -144,7 +145,7 @@ pub fn write(
 /// Run directories.
 #[derive(Debug, Default)]
 struct Found {
-    /// With the names of their pages.
+    /// Each with the name of its page.
     runs: Vec<(PathBuf, String)>,
     unfinished: usize,
     seen: BTreeSet<PathBuf>,
@@ -173,7 +174,7 @@ impl Found {
         let mut inside = Vec::new();
         for entry in fs::read_dir(directory).map_err(at())? {
             let entry = entry.map_err(at())?;
-            // What is still being made is renamed at any moment.
+            // Temporary files can be renamed at any moment.
             if !files::is_part(&entry.file_name()) {
                 inside.push(entry.path());
             }
@@ -207,8 +208,8 @@ impl Found {
         Ok(())
     }
 
-    /// Whether the memory is there for the largest recordings, one a thread; what cannot be read is
-    /// said later.
+    /// Checks that the memory suffices for the largest recordings, one per thread. Errors of
+    /// reading are reported later.
     fn check_memory(&self) -> Result<(), TooMuch> {
         let at_once = self.runs.len().min(rayon::current_num_threads()) as f64;
         let settings = self
@@ -220,7 +221,7 @@ impl Found {
         largest.map_or(Ok(()), |needs| needs.times(at_once).check_memory())
     }
 
-    /// Writes all pages, the first one last; `out` is where they will be.
+    /// Writes all pages, the first page last; `out` is their final place.
     fn write(&self, folder: &Path, out: &Path) -> Result<Written, GalleryError> {
         let cards = self.runs.par_iter().map(|(run, name)| {
             let recording = read(run)?;
@@ -261,19 +262,19 @@ impl Found {
     }
 }
 
-/// Whether a folder is marked as that of a gallery.
+/// Whether a folder is marked as a gallery.
 ///
 /// # Errors
-/// [`FileError`] if it cannot be looked into.
+/// [`FileError`] if the folder cannot be read.
 pub fn is_marked(folder: &Path) -> Result<bool, FileError> {
     match files::exists(&folder.join(MARKER)) {
-        // A file is in its place.
+        // The path is a file.
         Err(error) if error.error.kind() == ErrorKind::NotADirectory => Ok(false),
         marked => marked,
     }
 }
 
-/// How far the run of a directory is, by its marks; of other directories, nothing is there.
+/// Progress of the run in a directory, from the files present; `Pending` without any.
 fn progress(path: &Path) -> Result<Progress, FileError> {
     Ok(if files::exists(&path.join(DONE))? {
         Progress::Done
@@ -309,20 +310,20 @@ impl Card {
     fn of(recording: &Recording, page: &str, bytes: usize) -> Self {
         let last = recording.steps();
         let scene = Scene::of(recording, last, Colouring::Structure, None);
-        let minds = recording.minds.as_ref();
+        let controller = recording.controller.as_ref();
         let share = recording.in_structure(last) as f64 / recording.robots().max(1) as f64;
         let about = json!({
             "page": page,
             "source": page::source(&recording.origin.name),
             "names": recording.names.iter().map(|name| name.name()).collect::<Vec<_>>(),
             "share": share,
-            "fitness": minds.and_then(|minds| minds.fitness.last()),
+            "fitness": controller.and_then(|data| data.fitness.last()),
             "seed": recording.origin.seed.map(|seed| seed.to_string()),
             "grid": recording.grid.to_string(),
             "width": scene.width,
             "height": scene.height,
-            "model": minds.map(|minds| model_name(minds.topology.model()).to_uppercase()),
-            "prediction": minds.map(|minds| prediction_name(minds.topology)),
+            "model": controller.map(|data| model_name(data.topology.model()).to_uppercase()),
+            "prediction": controller.map(|data| prediction_name(data.topology)),
             "noise": recording.origin.noise,
             "robots": recording.robots(),
         });

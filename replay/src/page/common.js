@@ -1,10 +1,10 @@
 const about = JSON.parse(document.getElementById('about').textContent);
 const element = (id) => document.getElementById(id);
 
-/* Base64 of zlib → bytes. */
+/* Unpacks base64 of zlib data into bytes. */
 async function unpacked(text) {
   if (typeof DecompressionStream === 'undefined') {
-    throw new Error('this browser cannot unpack the page; those of 2023 and later can');
+    throw new Error('this browser cannot unpack the page; browsers since 2023 can');
   }
   let packed;
   if (Uint8Array.fromBase64) {
@@ -18,7 +18,7 @@ async function unpacked(text) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/* The colours of the theme that is shown, by name. */
+/* The colours of the current theme, by name. */
 let colours = {};
 function readColours() {
   const style = getComputedStyle(document.documentElement);
@@ -28,7 +28,7 @@ function readColours() {
 }
 readColours();
 
-/* Calls back whenever the theme changes, by the button or by the system. */
+/* Calls back whenever the button or the system changes the theme. */
 function onTheme(button, changed) {
   const root = document.documentElement;
   const system = matchMedia('(prefers-color-scheme: dark)');
@@ -47,7 +47,7 @@ function onTheme(button, changed) {
   show();
 }
 
-/* The arrow for each heading, turned around the middle of its cell; y runs south. */
+/* The arrow for each heading, rotated about the middle of its cell; y points south. */
 const arrows = [0, 1, 2, 3].map((heading) => about.arrow.map(([x, y]) => {
   let [u, v] = [x - 0.5, y - 0.5];
   for (let i = 0; i < heading; i++) [u, v] = [v, -u];
@@ -55,11 +55,11 @@ const arrows = [0, 1, 2, 3].map((heading) => about.arrow.map(([x, y]) => {
 }));
 
 const inkName = (ink) => (typeof ink === 'string' ? ink : 'surprise-' + ink.surprise);
-/* Shapes for those to whom colours are alike: with a hole in the middle, with a ring around. */
+/* Shapes for readers who cannot tell the colours apart: a hole in the middle, a ring around. */
 const PIERCED = new Set(['other', 'surprise-1']);
 const RINGED = new Set(['surprise-3']);
 
-/* Draws robots, all of one ink at once, in cells of `side` pixels. */
+/* Draws robots, grouped by ink, in cells of `side` pixels. */
 function drawRobots(context, robots, height, side) {
   const inks = new Map();
   for (const robot of robots) {
@@ -110,7 +110,7 @@ function drawRobots(context, robots, height, side) {
   }
 }
 
-/* Sets the size of a canvas in pixels of the screen; cells are whole pixels. */
+/* Sets the size of a canvas in screen pixels; cells are whole pixels. */
 function fitCanvas(canvas, width, height, across, down) {
   const scale = window.devicePixelRatio || 1;
   const side = Math.max(1, Math.floor(Math.min((across * scale) / width, (down * scale) / height)));
@@ -121,7 +121,7 @@ function fitCanvas(canvas, width, height, across, down) {
   return side;
 }
 
-/* Empty cells, with lines between them where there is room. */
+/* Empty cells, with lines between them if they are large enough. */
 function drawCells(context, width, height, side) {
   context.fillStyle = colours.cell;
   context.fillRect(0, 0, width * side, height * side);

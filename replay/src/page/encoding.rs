@@ -1,28 +1,27 @@
 //! The states of a recording as text for a page: bytes, deflated, in base64.
 //!
-//! The page reckons again whatever follows from poses (what is sensed), from moves (the poses
-//! themselves) or from the key of the noise (what it flipped), so that only what robots did,
-//! expected and belong to is stored.
+//! Only what robots did and predicted, and which structures they belong to, is stored. The page
+//! recomputes readings from poses and the noise key, and poses from moves.
 //!
-//! | what | bytes |
+//! | content | bytes |
 //! |---|---|
-//! | x, then y of the starts | two a robot |
-//! | headings of the starts | one a robot |
-//! | mispredicted bits of each step; robots that moved in it | four a step |
-//! | robots in the structure in each state | four a state |
+//! | x, then y of the starting poses | two per robot |
+//! | headings of the starting poses | one per robot |
+//! | mispredicted bits in each step; robots that moved in each step | four per step |
+//! | robots in the dominant structure in each state | four per state |
 //! | blocks of [`BLOCK`] steps, see below | |
 //!
-//! A block has `n` steps and their `n + 1` states, the last of which is the first of the next
-//! block. It is made of planes: a byte a robot and step (or state), all of one robot after the
-//! other. A plane of states has the change (exclusive or) from the state before, in the first state
-//! the byte itself. Numbers are little-endian.
+//! A block has `n` steps and their `n + 1` states; its last state is the first of the next block.
+//! It consists of planes: one byte per robot and step (or state), robot after robot. A plane of
+//! states stores the first state, then the exclusive or of each state with the previous one.
+//! Numbers are little-endian.
 //!
-//! | plane of a block | of | if |
+//! | plane of a block | one byte per | present if |
 //! |---|---|---|
-//! | move: bit 0 action, bit 1 turn, bit 2 whether it moved | steps | robots have minds |
-//! | prediction, low byte; high byte | states | robots have minds; more than 8 sensors |
-//! | x low, x high, y low, y high, heading | states | robots have no minds |
-//! | structures | states | |
+//! | move: bit 0 action, bit 1 turn, bit 2 whether it moved | step | it is not a trajectory |
+//! | prediction, low byte; high byte | state | it is not a trajectory; more than 8 sensors |
+//! | x low, x high, y low, y high, heading | state | it is a trajectory |
+//! | structures | state | always |
 
 use crate::recording::Recording;
 use data_encoding::BASE64;
@@ -33,21 +32,21 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::io::Write;
 
-/// Steps of a block: what the page decodes at once.
+/// Steps per block: the page decodes one block at a time.
 pub const BLOCK: usize = 128;
 
-/// What the page has to know to read the bytes.
+/// What the page needs to know to read the bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Layout {
     /// Number of robots.
     pub robots: usize,
-    /// Number of steps; there is one state more.
+    /// Number of steps; there is one more state.
     pub steps: usize,
-    /// Steps of a block.
+    /// Steps per block.
     pub block: usize,
-    /// Whether anything is known but poses.
-    pub minds: bool,
-    /// Bytes of a prediction.
+    /// Whether more than poses is known.
+    pub has_controller: bool,
+    /// Bytes per prediction.
     pub prediction_bytes: usize,
 }
 
@@ -58,7 +57,7 @@ pub fn encode(recording: &Recording) -> (Layout, String) {
         robots: recording.robots(),
         steps: recording.steps(),
         block: BLOCK,
-        minds: recording.minds.is_some(),
+        has_controller: recording.controller.is_some(),
         prediction_bytes: sensors(recording).div_ceil(8),
     };
     let mut bytes = Vec::new();
@@ -77,12 +76,12 @@ pub fn encode(recording: &Recording) -> (Layout, String) {
     (layout, packed(&[&[bytes][..], &blocks].concat()))
 }
 
-/// Bytes as text: deflated with zlib's header, in base64.
+/// Bytes as text: deflated with a zlib header, in base64.
 #[must_use]
 pub fn packed(parts: &[Vec<u8>]) -> String {
     let mut deflate = ZlibEncoder::new(Vec::new(), Compression::default());
     for part in parts {
-        // A vector takes whatever is written to it.
+        // Writing to a vector cannot fail.
         let _ = deflate.write_all(part);
     }
     BASE64.encode(&deflate.finish().unwrap_or_default())
@@ -90,13 +89,13 @@ pub fn packed(parts: &[Vec<u8>]) -> String {
 
 fn sensors(recording: &Recording) -> usize {
     recording
-        .minds
+        .controller
         .as_ref()
-        .map_or(0, |minds| minds.topology.sensors())
+        .map_or(0, |data| data.topology.sensors())
 }
 
-/// Of each step the mispredicted bits and the robots that moved, of each state the robots in the
-/// structure.
+/// The number of mispredicted bits and of robots that moved, per step, and of robots in the
+/// dominant structure, per state.
 fn counts(recording: &Recording) -> impl Iterator<Item = u32> {
     let steps = 0..recording.steps();
     let mispredicted = steps.clone().map(move |t| {
@@ -119,11 +118,11 @@ fn has_moved(from: Pose, to: Pose) -> bool {
     (from.x, from.y) != (to.x, to.y)
 }
 
-/// The block that begins with a step.
+/// The block that starts with step `first`.
 fn block(recording: &Recording, layout: Layout, first: usize) -> Vec<u8> {
     let steps = BLOCK.min(layout.steps - first);
     let mut bytes = Vec::new();
-    if layout.minds {
+    if layout.has_controller {
         bytes.extend(per_step(layout, first, steps, |t, robot| {
             move_code(recording, t, robot)
         }));

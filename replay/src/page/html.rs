@@ -1,4 +1,4 @@
-//! What the pages have in common: one document with everything in it.
+//! What all pages share: one self-contained document.
 
 use crate::palette::{DARK, LIGHT, Theme};
 use minimal_surprise_controller::Turn;
@@ -6,29 +6,29 @@ use minimal_surprise_evolution::text;
 use serde_json::Value;
 use std::fmt::Write;
 
-/// Turns by the number that the page has for them.
+/// Turns by their number on the page.
 pub(super) const TURNS: [Turn; 2] = [Turn::CounterClockwise, Turn::Clockwise];
 const _: () = assert!(TURNS[0] as u8 == 0 && TURNS[1] as u8 == 1);
 
-/// A page: its parts.
+/// The parts of a page.
 #[derive(Clone, Copy, Debug)]
 pub struct Document<'a> {
-    /// What the window is called.
+    /// The window's title.
     pub title: &'a str,
-    /// Its style, after the common one.
+    /// The page's own style, after the common one.
     pub style: &'a str,
-    /// Its body.
+    /// The body.
     pub body: &'a str,
-    /// Its script, after the common one.
+    /// The page's own script, after the common one.
     pub script: &'a str,
-    /// What the script reads.
+    /// JSON data for the script.
     pub about: &'a Value,
-    /// What the script unpacks.
+    /// Packed data for the script.
     pub data: &'a str,
 }
 
 impl Document<'_> {
-    /// The text of the file. The browser is told to load nothing.
+    /// The text of the file. Its security policy forbids the browser to load anything.
     #[must_use]
     pub fn to_html(&self) -> String {
         let Self {
@@ -40,7 +40,7 @@ impl Document<'_> {
             data,
         } = self;
         let (light, dark) = (variables(&LIGHT), variables(&DARK));
-        // No tag can end early in it.
+        // Escaped so that the JSON cannot close its tag.
         let about = about.to_string().replace('<', "\\u003c");
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -63,7 +63,7 @@ impl Document<'_> {
     }
 }
 
-/// The colours of a theme as variables of the style.
+/// The colours of a theme as CSS variables.
 fn variables(theme: &Theme) -> String {
     let mut text = String::new();
     if let Ok(Value::Object(colours)) = serde_json::to_value(theme) {

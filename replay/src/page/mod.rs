@@ -1,13 +1,13 @@
-//! A replay as one page that needs nothing else: it works from a file, without a network, by mouse
-//! and by keyboard, and checks the states that it shows.
+//! A replay as one self-contained page: it opens as a file, without a network, is controlled by
+//! mouse and keyboard, and verifies the states that it shows.
 //!
-//! What the page shows and how it is drawn is told by Rust in JSON; the states are packed by
-//! [`encoding`]. The script follows the rules of [`super::scene`].
+//! The page gets what to show and how to draw it as JSON, and the states packed by [`encoding`].
+//! Its script follows the rules of [`super::scene`].
 
 pub mod encoding;
 pub mod html;
 
-use super::recording::{Minds, Origin, Recording};
+use super::recording::{ControllerData, Origin, Recording};
 use super::scene::Ink;
 use super::{palette, scene};
 use html::Document;
@@ -18,13 +18,14 @@ use minimal_surprise_sim::damage::Damage;
 use minimal_surprise_sim::{Grid, Heading, Structure};
 use serde_json::{Value, json};
 
-/// Most robot-steps that a page takes: what a browser opens without trouble.
+/// Most robot-steps on a page: what browsers open without trouble.
 pub const ROBOT_STEPS_MAX: u64 = 20_000_000;
 /// Most cells of a page's torus.
 pub const CELLS_MAX: u32 = 4_000_000;
 
 /// A recording is too large for a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PageError {
     /// Too many steps of too many robots.
     #[error(
@@ -45,7 +46,7 @@ pub enum PageError {
     },
 }
 
-/// Whether a page can hold so much.
+/// Checks that a page can hold this much.
 ///
 /// # Errors
 /// [`PageError`] if there is too much to show.
@@ -60,7 +61,7 @@ pub fn check_page(robots: usize, steps: usize, grid: Grid) -> Result<(), PageErr
     Ok(())
 }
 
-/// The page. In a gallery, it links to the gallery's first page.
+/// The page. In a gallery, it links back to the gallery's first page.
 ///
 /// # Errors
 /// [`PageError`] if there is too much to show.
@@ -89,7 +90,7 @@ pub fn page(
 /// Everything but the states.
 fn about(recording: &Recording) -> Value {
     let origin = &recording.origin;
-    let minds = recording.minds.as_ref();
+    let controller = recording.controller.as_ref();
     let scene = scene::Scene::of(recording, 0, scene::Colouring::Plain, None);
     let damage = origin.damage.as_ref().map(|damaged| {
         let done = match damaged.damage {
@@ -107,22 +108,22 @@ fn about(recording: &Recording) -> Value {
         "structures": Structure::ALL.map(Structure::name),
         "names": recording.names.iter().map(|s| s.name()).collect::<Vec<_>>(),
         "named": recording.name().and_then(|name| Structure::ALL.iter().position(|&s| s == name)),
-        "model": minds.map(|minds| model_name(minds.topology.model()).to_uppercase()),
-        "prediction": minds.map(|minds| prediction_name(minds.topology)),
-        "sensors": minds.map_or(0, |minds| minds.topology.sensors()),
-        "cells": minds.map(|minds| {
-            let cells = minds.topology.model().cells().iter();
+        "model": controller.map(|data| model_name(data.topology.model()).to_uppercase()),
+        "prediction": controller.map(|data| prediction_name(data.topology)),
+        "sensors": controller.map_or(0, |data| data.topology.sensors()),
+        "cells": controller.map(|data| {
+            let cells = data.topology.model().cells().iter();
             cells.map(|cell| [cell.ahead, cell.left]).collect::<Vec<_>>()
         }),
-        "offsets": minds.map(|minds| Heading::ALL.map(|heading| {
-            let cells = minds.topology.model().cells().iter();
+        "offsets": controller.map(|data| Heading::ALL.map(|heading| {
+            let cells = data.topology.model().cells().iter();
             cells.map(|&cell| heading.offset(cell)).collect::<Vec<_>>()
         })),
         "ahead": Heading::ALL.map(Heading::ahead),
         "turned": Heading::ALL.map(|heading| html::TURNS.map(|turn| heading.turned(turn))),
         "seed": origin.seed.map(|seed| seed.to_string()),
         "noise": origin.noise,
-        "flips": minds.and_then(|minds| flips(minds, origin)),
+        "flips": controller.and_then(|data| flips(data, origin)),
         "run_hash": origin.run_hash,
         "recorded_hash": origin.steps_hash.as_ref().map(|recorded| &recorded.hash),
         "computed_hash": recording.steps_hash.as_ref().map(ToString::to_string),
@@ -135,13 +136,13 @@ fn about(recording: &Recording) -> Value {
     })
 }
 
-/// What the page draws the noise from again; nothing without noise.
-fn flips(minds: &Minds, origin: &Origin) -> Option<Value> {
-    let key = minds.noise.key();
+/// What the page generates the noise from; `None` without noise.
+fn flips(controller: &ControllerData, origin: &Origin) -> Option<Value> {
+    let key = controller.noise.key();
     let words = key.as_chunks::<4>().0.iter();
     let words: Vec<u32> = words.map(|&word| u32::from_le_bytes(word)).collect();
-    let rate = minds.noise.rate();
-    let sensed = minds.topology.model().mask().bits();
+    let rate = controller.noise.rate();
+    let sensed = controller.topology.model().mask().bits();
     let version = origin.steps_hash.as_ref().map(|recorded| recorded.version);
     let hashed = match version.unwrap_or_default() {
         Version::V1 => u16::MAX,
@@ -154,7 +155,7 @@ fn flips(minds: &Minds, origin: &Origin) -> Option<Value> {
     })
 }
 
-/// Which inks are drawn as an outline.
+/// Which inks are drawn as outlines.
 pub(super) fn hollow() -> Value {
     let inks = [
         ("plain", Ink::Plain),
@@ -172,7 +173,7 @@ pub(super) fn hollow() -> Value {
         .into()
 }
 
-/// What the run is called: its structures.
+/// The title of the run: its dominant structures.
 fn title(recording: &Recording) -> String {
     let names: Vec<&str> = recording.names.iter().map(|name| name.name()).collect();
     let mut title = if names.is_empty() {
@@ -186,7 +187,7 @@ fn title(recording: &Recording) -> String {
     title
 }
 
-/// The last part of a path: a page says nothing of the folders of whoever wrote it.
+/// The last part of a path: pages do not disclose the folders of their author.
 pub(super) fn source(name: &str) -> String {
     let path = std::path::Path::new(name);
     let last = path.file_name().map(|last| last.to_string_lossy());

@@ -3,7 +3,7 @@ const { robots: R, steps: T, block: BLOCK } = layout;
 
 /* ---- The recording ---- */
 
-/* Everything that the page knows of the run; `recording` of the program, read back. */
+/* Everything that the page knows about the run; the counterpart of recording.rs. */
 class Recording {
   constructor(bytes) {
     this.bytes = bytes;
@@ -23,12 +23,12 @@ class Recording {
     for (let first = 0; first < T; first += BLOCK) {
       this.offsets.push(at);
       const n = Math.min(BLOCK, T - first);
-      const ofSteps = layout.minds ? 1 : 0;
-      const ofStates = layout.minds ? layout.prediction_bytes + 1 : 6;
+      const ofSteps = layout.has_controller ? 1 : 0;
+      const ofStates = layout.has_controller ? layout.prediction_bytes + 1 : 6;
       at += R * (n * ofSteps + (n + 1) * ofStates);
     }
-    if (at !== bytes.length) throw new Error('the page is damaged: its data have another length');
-    this.keyframes = layout.minds ? this.findKeyframes() : [];
+    if (at !== bytes.length) throw new Error('the page is damaged: its data have the wrong length');
+    this.keyframes = layout.has_controller ? this.findKeyframes() : [];
     this.recent = new Map();
     this.board = new Board(about.flips?.sensed);
     this.fitness = new Float64Array(T + 1);
@@ -66,7 +66,7 @@ class Recording {
     });
   }
 
-  /* The states and steps of a block: arrays with all robots of a state after the other. */
+  /* The states and steps of a block, as arrays: all robots of one state, then of the next. */
   decode(block) {
     const first = block * BLOCK;
     const n = Math.min(BLOCK, T - first);
@@ -78,8 +78,8 @@ class Recording {
       ys: new Uint16Array(states),
       headings: new Uint8Array(states),
       members: new Uint8Array(states),
-      predicted: layout.minds ? new Uint16Array(states) : null,
-      moves: layout.minds ? new Uint8Array(n * R) : null,
+      predicted: layout.has_controller ? new Uint16Array(states) : null,
+      moves: layout.has_controller ? new Uint8Array(n * R) : null,
     };
     const bytes = this.bytes;
     let at = this.offsets[block];
@@ -93,7 +93,7 @@ class Recording {
       }
     };
     const { xs, ys, headings } = decoded;
-    if (layout.minds) {
+    if (layout.has_controller) {
       const frame = this.keyframes[block];
       for (let robot = 0; robot < R; robot++) {
         let [x, y, heading] = [frame[0][robot], frame[1][robot], frame[2][robot]];
@@ -122,7 +122,7 @@ class Recording {
     return decoded;
   }
 
-  /* The block that has a state, and where the state begins in its arrays. */
+  /* The block that contains a state, and where the state starts in its arrays. */
   at(t) {
     const block = Math.min(Math.floor(t / BLOCK), this.offsets.length - 1);
     let decoded = this.recent.get(block);
@@ -134,9 +134,9 @@ class Recording {
     return { block: decoded, from: (t - decoded.first) * R };
   }
 
-  /* What every robot senses in step t; nothing after the last step, and of a trajectory. */
+  /* What every robot senses in step t; null after the last step and for trajectories. */
   sensed(t) {
-    if (!layout.minds || t >= T) return null;
+    if (!layout.has_controller || t >= T) return null;
     if (this.sensedOf !== t) {
       const { block, from } = this.at(t);
       this.readings = this.board.sense(block, from, this.readings);
@@ -148,14 +148,14 @@ class Recording {
 
 const wrapped = (at, side) => (at < 0 ? at + side : at >= side ? at - side : at);
 
-/* Which cells are taken. Noise flips the bits of `flipped`. */
+/* The occupied cells. Noise flips only the bits in `flipped`. */
 class Board {
   constructor(flipped) {
     this.cells = new Uint8Array(width * height);
     this.noise = about.flips ? new Noise(about.flips, flipped) : null;
   }
 
-  /* What all robots of a state sense, noise included. */
+  /* What all robots sense in a state, noise included. */
   sense({ first, xs, ys, headings }, from, readings = new Uint16Array(R)) {
     const { cells } = this;
     for (let i = from; i < from + R; i++) cells[ys[i] * width + xs[i]] = 1;
@@ -177,7 +177,7 @@ class Board {
   }
 }
 
-/* The noise of noise.rs: ChaCha8, whose stream is the step; a robot has half of a block. */
+/* The noise of noise.rs: ChaCha8 with the step as its stream; each robot takes half a block. */
 class Noise {
   constructor({ key, per_65536 }, flipped) {
     this.below = per_65536;
@@ -186,7 +186,7 @@ class Noise {
     this.words = new Int32Array(16);
   }
 
-  /* Flips what all robots sense in a step. */
+  /* Flips bits of what all robots sense in a step. */
   flip(step, readings) {
     this.start[14] = step;
     for (let robot = 0; robot < R; robot++) {
@@ -256,7 +256,7 @@ function scene(t, colouring, picked) {
 }
 
 function marks(t, robot, sensed) {
-  if (!layout.minds) return [];
+  if (!layout.has_controller) return [];
   const { block, from } = recording.at(t);
   const i = from + robot;
   return about.offsets[block.headings[i]].map(([dx, dy], sensor) => {
@@ -277,7 +277,7 @@ function ones(bits) {
   return count;
 }
 
-/* ---- The check: the chain of steps_hash.rs ---- */
+/* ---- The check: the hash chain of steps_hash.rs ---- */
 
 const check = { status: 'waiting', computed: null, compared: null, done: 0 };
 
@@ -289,11 +289,11 @@ async function checkSteps() {
     text.textContent = words;
     line.className = kind;
   };
-  if (!layout.minds) {
-    return say('no hash', '–', 'No hash was recorded: a trajectory holds poses only.');
+  if (!layout.has_controller) {
+    return say('no hash', '–', 'Not verified: a trajectory has poses only and no hash.');
   }
   if (!(globalThis.crypto && crypto.subtle)) {
-    return say('unchecked', '–', 'The steps cannot be checked here: this browser has no SHA-256 for files.');
+    return say('unchecked', '–', 'Not verified: this browser offers no SHA-256 to pages opened as files.');
   }
   check.compared = about.recorded_hash || about.computed_hash;
   const digest = async (bytes) => new Uint8Array(await crypto.subtle.digest('SHA-256', bytes));
@@ -328,7 +328,7 @@ async function checkSteps() {
       hash = await digest(step);
       check.done++;
       if (performance.now() - rested > 8) {
-        // Readers that speak are told ten times at most.
+        // Screen readers announce the progress at most ten times.
         const words = `Checking the steps: ${10 * Math.floor((10 * check.done) / T)} %`;
         if (T > 2000 && text.textContent !== words) text.textContent = words;
         await new Promise((resume) => setTimeout(resume));
@@ -340,12 +340,12 @@ async function checkSteps() {
   element('page-hash').textContent = check.computed;
   if (check.computed !== check.compared) {
     say('bad', '✗', about.recorded_hash
-      ? 'The steps shown here are not those that the run recorded: their hashes differ.'
-      : 'The steps shown here are not those of the program: their hashes differ.', 'bad');
+      ? 'The steps shown here are not those of the recorded run: their hashes differ.'
+      : 'The steps shown here are not those that the program computed: their hashes differ.', 'bad');
   } else if (about.recorded_hash) {
-    say('good', '✓', 'The steps shown here hash to what the run recorded.', 'good');
+    say('good', '✓', 'Verified: identical to the recorded run.', 'good');
   } else {
-    say('good', '✓', 'The steps shown here hash to what the program computed; this run recorded no hash.', 'good');
+    say('good', '✓', 'Verified: identical to the run that the program computed; this run recorded no hash.', 'good');
   }
 }
 
@@ -358,7 +358,7 @@ function putPose(bytes, at, x, y, heading) {
   return at;
 }
 
-/* ---- What is shown ---- */
+/* ---- Drawing ---- */
 
 const SPEEDS = [1, 2, 5, 10, 20, 40, 80, 160, 320];
 const COLOURINGS = ['structure', 'surprise', 'plain'];
@@ -392,7 +392,7 @@ function drawSwarm(context, shown, side) {
   }
 }
 
-/* A hit is a square, a miss a cross, what is expected a ring; thick or filled where a robot is. */
+/* Hits are squares, misses are crosses, expectations are rings; thick or filled for a robot. */
 function drawMark(context, left, top, side, mark) {
   const [kind, what] = mark.split('-');
   const thick = what === 'occupied';
@@ -436,7 +436,7 @@ function draw() {
   element('seek').setAttribute('aria-valuetext', `state ${state.t} of ${T}`);
   element('time').innerHTML = `<b>${state.t}</b> of ${T}`;
   for (const curve of curves) curve.mark(state.t);
-  showMind(shown);
+  showWorldModel(shown);
   if (about.damage) small('now', shown.robots);
   if (!state.playing) announce();
 }
@@ -451,13 +451,13 @@ function announce() {
 
 function spoken() {
   const parts = [`State ${state.t} of ${T}`];
-  if (layout.minds && state.t > 0) parts.push(`fitness so far ${rounded(recording.fitness[state.t])}`);
+  if (layout.has_controller && state.t > 0) parts.push(`fitness so far ${rounded(recording.fitness[state.t])}`);
   if (structure) parts.push(`${recording.members[state.t]} of ${R} robots in ${structure}`);
-  if (state.picked !== null) parts.push(element('mind-text').textContent);
+  if (state.picked !== null) parts.push(element('world-model-text').textContent);
   return parts.join('. ');
 }
 
-/* ---- The world model of the robot that is picked ---- */
+/* ---- The world model of the selected robot ---- */
 
 const SVG = 'http://www.w3.org/2000/svg';
 function svg(parent, name, attributes = {}) {
@@ -469,7 +469,7 @@ function svg(parent, name, attributes = {}) {
 
 const views = {};
 function makeViews() {
-  if (!layout.minds) return;
+  if (!layout.has_controller) return;
   const reach = Math.max(...about.cells.map(([ahead]) => Math.abs(ahead)));
   for (const [name, words] of [['predicted', 'predicted'], ['sensed', 'sensed'], ['next', 'predicts next']]) {
     const figure = document.createElement('figure');
@@ -505,18 +505,18 @@ function setView(name, bits, kind) {
   picture.setAttribute('aria-label', bits === null ? 'nothing' : places.length ? `robots ${places.join(', ')}` : 'no robots');
 }
 
-let mindOf = null;
-function showMind(shown) {
+let shownModel = null;
+function showWorldModel(shown) {
   const { picked } = shown;
   const key = `${picked} ${state.t}`;
-  if (mindOf === key) return;
-  mindOf = key;
-  element('views').hidden = picked === null || !layout.minds;
+  if (shownModel === key) return;
+  shownModel = key;
+  element('views').hidden = picked === null || !layout.has_controller;
   if (document.activeElement !== element('robot')) element('robot').value = picked === null ? '' : picked;
   if (picked === null) {
-    element('mind-text').textContent = layout.minds
-      ? 'Pick a robot, with the mouse or with N, to see what it predicts and senses.'
-      : 'Nothing is known of what these robots sense and predict.';
+    element('world-model-text').textContent = layout.has_controller
+      ? 'Select a robot with the mouse or with N to see what it predicts and senses.'
+      : 'A trajectory has poses only: what its robots sense and predict is unknown.';
     return;
   }
   const { block, from } = recording.at(state.t);
@@ -524,7 +524,7 @@ function showMind(shown) {
   const names = about.structures.filter((_, bit) => (members >> bit) & 1);
   const { x, y, heading } = shown.robots[picked];
   let text = `Robot ${picked} at ${x}, ${y}, facing ${HEADINGS[heading]}, in ${names.join(' and ') || 'no structure'}. `;
-  if (layout.minds) {
+  if (layout.has_controller) {
     const predicted = block.predicted[from + picked];
     const sensed = recording.sensed(state.t);
     if (sensed) {
@@ -534,21 +534,21 @@ function showMind(shown) {
       setView('sensed', sensed[picked], kind);
       const after = recording.at(state.t + 1);
       setView('next', after.block.predicted[after.from + picked], () => 'expects');
-      text += `${about.sensors - ones(wrong)} of ${about.sensors} sensors as it predicted.`;
+      text += `${about.sensors - ones(wrong)} of ${about.sensors} sensors predicted correctly.`;
     } else {
       setView('predicted', predicted, () => 'expects');
       setView('sensed', null, () => '');
       setView('next', null, () => '');
-      text += 'The run ends before it looks.';
+      text += 'The run ends before it senses.';
     }
   }
-  element('mind-text').textContent = text;
+  element('world-model-text').textContent = text;
 }
 
 /* ---- Curves ---- */
 
 const curves = [];
-/* A curve over the states; drawn once a size and theme, only its mark moves. */
+/* A curve over the states: drawn once per size and theme; only its mark moves. */
 function addCurve(name, values, top, shown, ink, states = true) {
   const box = document.createElement('div');
   box.className = 'curve';
@@ -585,7 +585,7 @@ function addCurve(name, values, top, shown, ink, states = true) {
       pen.lineWidth = 1.5 * scale;
       pen.lineJoin = 'round';
       pen.beginPath();
-      // Where there are more states than pixels, the least and the most of each pixel.
+      // With more states than pixels, the minimum and maximum in each pixel.
       const height = (number) => down - 1 - (number / top) * (down - 2);
       const bins = Math.max(1, Math.min(last, across));
       for (let bin = 0; bin <= bins; bin++) {
@@ -611,7 +611,7 @@ function addCurve(name, values, top, shown, ink, states = true) {
   });
 }
 
-/* ---- Words ---- */
+/* ---- Text ---- */
 
 function makeWords() {
   document.title = about.title;
@@ -623,7 +623,7 @@ function makeWords() {
   const facts = [];
   if (structure) facts.push(`${percent(recording.members[T] / R)} of ${R} robots`);
   else facts.push(`${R} robots`);
-  if (layout.minds) facts.push(`fitness ${rounded(recording.fitness[T])}`);
+  if (layout.has_controller) facts.push(`fitness ${rounded(recording.fitness[T])}`);
   facts.push(`${about.grid.replace('x', ' × ')} torus`);
   if (about.model) facts.push(`sensor model ${about.model}`, `predictions ${about.prediction}`);
   if (about.noise > 0) facts.push(`noise ${about.noise}`);
@@ -632,7 +632,7 @@ function makeWords() {
   if (about.damage) facts.push(about.damage.done === 'remove' ? 'robots removed' : 'robots repositioned');
   element('facts').textContent = facts.join(' · ');
   const hashes = [['run', about.source], ['hash of the run', about.run_hash],
-    ['hash of its steps, recorded', about.recorded_hash], ['hash of its steps, computed', about.computed_hash]];
+    ['hash of the steps, recorded', about.recorded_hash], ['hash of the steps, computed', about.computed_hash]];
   const list = document.createElement('dl');
   const entry = (name, value, id) => {
     const [term, text] = [document.createElement('dt'), document.createElement('dd')];
@@ -641,7 +641,7 @@ function makeWords() {
     list.append(term, text);
   };
   for (const [name, value] of hashes) if (value) entry(name, value);
-  if (layout.minds) entry('hash of the steps on this page', '…', 'page-hash');
+  if (layout.has_controller) entry('hash of the steps on this page', '…', 'page-hash');
   element('hashes').append(list);
 }
 
@@ -682,7 +682,7 @@ function showBefore() {
   if (!about.damage) return;
   element('damage').hidden = false;
   element('damage-title').textContent = about.damage.done === 'remove'
-    ? 'Robots removed from the shaded area' : 'Robots of the shaded area put elsewhere';
+    ? 'Robots removed from the shaded area' : 'Robots repositioned from the shaded area';
   small('before', about.damage.before.map(([x, y, heading]) => ({ x, y, heading, ink: 'plain' })));
 }
 
@@ -690,7 +690,7 @@ function showBefore() {
 
 function seek(t) {
   state.t = Math.max(0, Math.min(T, t));
-  // At once: its own keys count from here.
+  // Immediately: the slider's own keys continue from this value.
   element('seek').value = state.t;
   elapsed = 0;
   redraw();
@@ -716,7 +716,7 @@ function pause() {
 
 function tick(now) {
   if (!state.playing) return;
-  // A page that was out of sight does not catch up.
+  // A page that was hidden does not catch up.
   elapsed += Math.max(0, Math.min(250, now - before)) * state.speed / 1000;
   before = now;
   const steps = Math.floor(elapsed);
@@ -767,7 +767,7 @@ function layOut(again = false) {
   const size = [element('stage').clientWidth, window.innerHeight, window.devicePixelRatio].join();
   if (again !== true && size === laidOut) return;
   laidOut = size;
-  // As large as leaves the controls in sight.
+  // As large as possible with the controls still in view.
   const room = Math.max(300, window.innerHeight - element('frame').offsetTop - 160);
   side = fitCanvas(swarm, width, height, element('stage').clientWidth, room);
   ground = document.createElement('canvas');
@@ -827,7 +827,7 @@ function listen() {
   window.addEventListener('resize', layOut);
 }
 
-/* A state can be linked to: page.html#t=120&robot=4&colours=surprise */
+/* Links can select a state: page.html#t=120&robot=4&colours=surprise */
 function readAddress() {
   const given = new URLSearchParams(location.hash.slice(1));
   const number = (name, most) => {
@@ -853,7 +853,7 @@ async function open() {
   setSpeed(state.speed);
   element('colouring').value = state.colouring;
   const temperature = Float64Array.from(recording.moved, (moved) => moved / R);
-  if (layout.minds) {
+  if (layout.has_controller) {
     const fitness = recording.fitness.slice();
     fitness[0] = fitness[1];
     addCurve('Fitness so far', fitness, 1, rounded, 'text');
@@ -866,7 +866,7 @@ async function open() {
   onTheme(element('theme'), () => layOut(true));
   draw();
   state.opened = performance.now();
-  // The check is not waited for.
+  // The check runs in the background.
   setTimeout(() => checkSteps().catch((error) => {
     check.status = 'failed';
     element('check-text').textContent = `The steps cannot be checked: ${error.message}`;

@@ -1,4 +1,4 @@
-//! A value over time, as in the paper's Figs. 5 and 6; plotters lays the axes out.
+//! A value over time, as in the paper's Figs. 5 and 6, with the axes laid out by plotters.
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, channels, line};
 use super::{PictureError, named, words};
@@ -15,10 +15,10 @@ use plotters_backend::{
 };
 use std::convert::Infallible;
 
-/// Height of a curve by its width.
+/// Height of a curve relative to its width.
 const SHAPE: f64 = 0.56;
 
-/// Plotters has whole coordinates: this many make a millimetre or a pixel.
+/// Plotters has integer coordinates: this many per millimetre or pixel.
 const FINE: f64 = 100.0;
 
 /// Width of a curve on a screen, in pixels.
@@ -139,7 +139,7 @@ impl Curve<'_> {
     }
 }
 
-/// A drawing that plotters draws on.
+/// A drawing as a back end of plotters.
 struct Plot<'a> {
     drawing: &'a mut Drawing,
     size: (u32, u32),
@@ -165,7 +165,7 @@ impl Plot<'_> {
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
-/// Lines and words are all that curves are made of.
+/// Curves consist of lines and text only.
 impl DrawingBackend for Plot<'_> {
     type ErrorType = Infallible;
 
@@ -209,7 +209,7 @@ impl DrawingBackend for Plot<'_> {
         let (x, y) = self.at(at);
         let colour = hexadecimal(style.color());
         let height = words::CAPITALS * self.drawing.size.words();
-        // Of the capitals, from the anchor.
+        // From the anchor to the middle of the capitals.
         let down = match style.anchor().v_pos {
             VPos::Top => height / 2.0,
             VPos::Center => 0.0,
@@ -224,7 +224,7 @@ impl DrawingBackend for Plot<'_> {
                 };
                 self.drawing.words(text, anchor, (x, y + down), &colour);
             }
-            // The name of the upright axis, by its middle.
+            // The label of the vertical axis, by its middle.
             _ => self.drawing.words_upwards(text, (x + down, y), &colour),
         }
         Ok(())

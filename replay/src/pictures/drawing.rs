@@ -1,4 +1,4 @@
-//! What a picture is made of: areas, lines and words on a ground of some size, written as SVG.
+//! The parts of a picture: areas, lines and text on a background, written as SVG.
 
 use super::words;
 use crate::palette::Theme;
@@ -9,14 +9,14 @@ use svg::{Document, Node};
 /// How large a picture is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Size {
-    /// On paper: so many millimetres wide, with words of seven points.
+    /// On paper: the width in millimetres; text is set at 7 points.
     Paper(f64),
-    /// On a screen: cells of so many pixels.
+    /// On a screen: the side of a cell in pixels.
     Screen(u32),
 }
 
 impl Size {
-    /// Seven points in millimetres, or pixels.
+    /// Font size: 7 points in millimetres, or pixels.
     pub(super) fn words(self) -> f64 {
         match self {
             Self::Paper(_) => 2.47,
@@ -24,7 +24,7 @@ impl Size {
         }
     }
 
-    /// Room around everything.
+    /// Margin around the picture.
     pub(super) fn margin(self) -> f64 {
         match self {
             Self::Paper(_) => 0.5,
@@ -32,7 +32,7 @@ impl Size {
         }
     }
 
-    /// A line that is only just there.
+    /// The thinnest line.
     pub(super) fn hair(self) -> f64 {
         match self {
             Self::Paper(_) => 0.1,
@@ -40,7 +40,7 @@ impl Size {
         }
     }
 
-    /// On a screen a whole number of pixels, so that what is equal looks equal.
+    /// On a screen rounded up to whole pixels, so that equal lengths look equal.
     pub(super) fn whole(self, length: f64) -> f64 {
         match self {
             Self::Paper(_) => length,
@@ -48,7 +48,7 @@ impl Size {
         }
     }
 
-    /// On a screen the pixel that a place is in.
+    /// On a screen rounded down to whole pixels.
     pub(super) fn floor(self, place: f64) -> f64 {
         match self {
             Self::Paper(_) => place,
@@ -64,7 +64,7 @@ impl Size {
     }
 }
 
-/// Where words are put beside their place.
+/// How text is aligned to its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -153,7 +153,7 @@ impl Drawing {
         self.content.append(path);
     }
 
-    /// Filled so that what is under it is still seen.
+    /// Translucent, so that what lies below stays visible.
     pub(super) fn tinted(&mut self, outline: Data, colour: &str) {
         let path = Path::new()
             .set("d", outline)
@@ -173,7 +173,7 @@ impl Drawing {
         self.content.append(path);
     }
 
-    /// Words whose capitals are centred on `y`.
+    /// Text whose capitals are centred on `y`.
     pub(super) fn words(&mut self, words: &str, anchor: Anchor, (x, y): (f64, f64), colour: &str) {
         let size = self.size.words();
         let width = words::width(words, size);
@@ -183,7 +183,7 @@ impl Drawing {
             Anchor::End => x - width,
         };
         let base = y + words::CAPITALS * size / 2.0;
-        // On a screen, letters that stand on a pixel are sharper.
+        // On a screen, letters are sharper on a pixel boundary.
         let base = match self.size {
             Size::Paper(_) => base,
             Size::Screen(_) => base.round(),
@@ -191,7 +191,7 @@ impl Drawing {
         self.outlined(words::outlines(words, size, (x, base)), words, colour, None);
     }
 
-    /// Words that go up, their capitals centred on `x`, their middle at `y`.
+    /// Text rotated to run upwards, its capitals centred on `x`, its middle at `y`.
     pub(super) fn words_upwards(&mut self, words: &str, (x, y): (f64, f64), colour: &str) {
         let size = self.size.words();
         let start = -words::width(words, size) / 2.0;
@@ -201,7 +201,7 @@ impl Drawing {
     }
 
     fn outlined(&mut self, outlines: Data, words: &str, colour: &str, turned: Option<String>) {
-        // What cannot be read by a program otherwise.
+        // Programs cannot read outlines.
         let mut path = Path::new()
             .set("aria-label", words)
             .set("d", outlines)
@@ -221,9 +221,9 @@ pub(super) fn channels(colour: &str) -> [u8; 3] {
     })
 }
 
-/// Lengths in pictures have three decimals; more only make them longer.
+/// Lengths have three decimals; more would only make the file longer.
 pub(super) fn rounded(length: f64) -> f32 {
-    // Not the negative zero.
+    // Turns negative zero into zero.
     ((length * 1000.0).round() / 1000.0 + 0.0) as f32
 }
 
@@ -232,7 +232,7 @@ pub(super) fn polygon(corners: &[(f64, f64)]) -> Data {
     line(corners).close()
 }
 
-/// A line through some points.
+/// A line through the points.
 pub(super) fn line(points: &[(f64, f64)]) -> Data {
     let mut data = Data::new();
     for (index, &(x, y)) in points.iter().enumerate() {

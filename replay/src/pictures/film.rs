@@ -1,7 +1,7 @@
-//! Animations: a frame a state, as GIF, or as MP4 where ffmpeg is installed.
+//! Animations: one frame per state, as GIF, or as MP4 where ffmpeg is installed.
 
 use super::raster::Pixels;
-use super::{Look, PictureError, last_shown, state};
+use super::{PictureError, Style, last_shown, state};
 use crate::recording::Recording;
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
 use rayon::prelude::*;
@@ -10,26 +10,26 @@ use std::collections::BTreeMap;
 use std::io::{ErrorKind, Read, Write};
 use std::process::{Command, Stdio};
 
-/// How a run is shown as time goes by.
+/// An animation of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Film<'a> {
     /// The run.
     pub recording: &'a Recording,
     /// How its states are drawn; `size` is [`super::Size::Screen`].
-    pub look: &'a Look,
+    pub style: &'a Style,
     /// Steps between two frames; the last state is always shown.
     pub every: u32,
-    /// Frames a second.
+    /// Frames per second.
     pub frames_per_second: u32,
 }
 
 /// Frames drawn at the same time.
 const AT_ONCE: usize = 16;
 
-/// How long the last frame of a GIF is held before it starts again, in hundredths of a second.
+/// How long a GIF shows its last frame before it restarts, in hundredths of a second.
 const PAUSE: u16 = 200;
 
-/// What is not changed by a frame of a GIF.
+/// The palette index of pixels that a frame of a GIF does not change.
 const UNCHANGED: u8 = 0;
 
 type Rgb = [u8; 3];
@@ -38,20 +38,20 @@ impl Film<'_> {
     /// The states that are shown.
     #[must_use]
     pub fn states(&self) -> Vec<usize> {
-        let last = last_shown(self.recording, self.look.colouring);
+        let last = last_shown(self.recording, self.style.colouring);
         let mut states: Vec<usize> = (0..last).step_by(self.every.max(1) as usize).collect();
         states.push(last);
         states
     }
 
-    /// Draws all frames, and hands them over in order.
+    /// Draws all frames, and passes them on in order.
     fn each(
         &self,
         mut take: impl FnMut(Pixels) -> Result<(), PictureError>,
     ) -> Result<(), PictureError> {
         for states in self.states().chunks(AT_ONCE) {
             let frames = states.par_iter().map(|&t| {
-                let drawing = state::frame(self.recording, t, self.look)?;
+                let drawing = state::frame(self.recording, t, self.style)?;
                 Pixels::of_screen(&drawing)
             });
             for frame in frames.collect::<Result<Vec<_>, _>>()? {
@@ -61,10 +61,10 @@ impl Film<'_> {
         Ok(())
     }
 
-    /// The run as GIF, which starts again at its end.
+    /// The run as GIF, which restarts at its end.
     ///
     /// # Errors
-    /// [`PictureError`] if the recording does not have what is asked for, or a frame is too large.
+    /// [`PictureError`] if the recording lacks what is asked for, or a frame is too large.
     pub fn gif(&self) -> Result<Vec<u8>, PictureError> {
         let mut palette = Palette::default();
         let mut frames: Vec<Frame<'static>> = Vec::new();
@@ -75,7 +75,7 @@ impl Film<'_> {
             size = (indexed.width, indexed.height);
             let mut frame = indexed.changed_since(before.as_ref());
             frame.delay = (100.0 / f64::from(self.frames_per_second)).round() as u16;
-            // Compressed at once: many frames would not fit in memory otherwise.
+            // Compressed immediately: many frames would not fit in memory otherwise.
             frame.make_lzw_pre_encoded();
             frames.push(frame);
             before = Some(indexed);
@@ -97,12 +97,12 @@ impl Film<'_> {
         encode().map_err(|error: gif::EncodingError| PictureError::Encoding(error.to_string()))
     }
 
-    /// The run as MP4 (H.264), by the program ffmpeg.
+    /// The run as MP4 (H.264), encoded by ffmpeg.
     ///
     /// # Errors
     /// [`PictureError`] as of [`Film::gif`], and if ffmpeg is missing or fails.
     pub fn mp4(&self) -> Result<Vec<u8>, PictureError> {
-        // A file of this kind is not written from its start to its end, so not to a pipe.
+        // MP4 is not written sequentially, so it cannot go to a pipe.
         let folder = tempfile::tempdir().map_err(PictureError::Ffmpeg)?;
         let file = folder.path().join("film.mp4");
         let mut ffmpeg = None;
@@ -114,7 +114,7 @@ impl Film<'_> {
             };
             size = Some((pixels.width, pixels.height));
             match &mut child.stdin {
-                // That it has stopped is said by its exit code, and why by what it says.
+                // ffmpeg has stopped: its exit code and its messages say why.
                 Some(pipe) => match pipe.write_all(&pixels.rgb) {
                     Err(error) if error.kind() != ErrorKind::BrokenPipe => {
                         Err(PictureError::Ffmpeg(error))
@@ -130,7 +130,7 @@ impl Film<'_> {
         drop(child.stdin.take());
         let mut said = String::new();
         if let Some(pipe) = &mut child.stderr {
-            // What it says matters only if it fails.
+            // Its messages matter only if it fails.
             let _ = pipe.read_to_string(&mut said);
         }
         let status = child.wait().map_err(PictureError::Ffmpeg)?;
@@ -143,7 +143,7 @@ impl Film<'_> {
         std::fs::read(&file).map_err(PictureError::Ffmpeg)
     }
 
-    /// Looks whether there is an ffmpeg, for those who want to know before they write anything.
+    /// Checks whether ffmpeg is installed, before anything is written.
     ///
     /// # Errors
     /// [`PictureError`] if it cannot be started.
@@ -162,13 +162,13 @@ impl Film<'_> {
         pixels: &Pixels,
         file: &std::path::Path,
     ) -> Result<std::process::Child, PictureError> {
-        let ground = self.look.theme.ground.replace('#', "0x");
+        let ground = self.style.theme.ground.replace('#', "0x");
         let size = format!("{}x{}", pixels.width, pixels.height);
         let rate = self.frames_per_second.to_string();
         Command::new("ffmpeg")
             .args(["-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"])
             .args(["-s", &size, "-r", &rate, "-i", "-"])
-            // Players want even sides and colours at half the resolution.
+            // Players require even sides and colours at half the resolution.
             .args([
                 "-vf",
                 &format!("pad=ceil(iw/2)*2:ceil(ih/2)*2:color={ground}"),
@@ -190,12 +190,12 @@ fn not_started(error: std::io::Error) -> PictureError {
     }
 }
 
-/// The colours of a GIF, in the order in which they are met.
+/// The colours of a GIF, in order of appearance.
 ///
-/// Few are needed: robots look alike in every cell. When there is no room any more, words get
-/// colours that are nearly right.
+/// There are few: robots look the same in every cell. Once the palette is full, text gets the
+/// nearest colours.
 struct Palette {
-    /// Red, green and blue of each; the first stands for what is unchanged.
+    /// Red, green and blue of each colour; the first stands for unchanged pixels.
     colours: Vec<u8>,
     indices: BTreeMap<Rgb, u8>,
 }
@@ -244,7 +244,7 @@ impl Palette {
                 height: f64::from(pixels.height),
             })
         };
-        // Most pixels have the colour of the one before.
+        // Most pixels have the same colour as the previous one.
         let mut last: Option<(Rgb, u8)> = None;
         let colours = pixels.rgb.chunks_exact(3).map(|pixel| {
             let colour = [pixel[0], pixel[1], pixel[2]];
@@ -266,7 +266,7 @@ impl Palette {
     }
 }
 
-/// Pixels by their numbers in the palette.
+/// Pixels as palette indices.
 struct Indexed {
     width: u16,
     height: u16,
@@ -274,7 +274,7 @@ struct Indexed {
 }
 
 impl Indexed {
-    /// The smallest rectangle that has all changes, what did not change left out.
+    /// The smallest rectangle with all changes; unchanged pixels in it are left out.
     fn changed_since(&self, before: Option<&Self>) -> Frame<'static> {
         let whole = Frame {
             width: self.width,
@@ -299,7 +299,7 @@ impl Indexed {
             (right, bottom) = (right.max(x + 1), bottom.max(y + 1));
         }
         if left >= right {
-            // Nothing moved; a frame has one pixel at least.
+            // Nothing changed; a frame has at least one pixel.
             (left, top, right, bottom) = (0, 0, 1, 1);
         }
         let inside = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));

@@ -2,12 +2,12 @@
 
 use super::drawing::{Anchor, Drawing, Size};
 use super::symbols::{area_stroke, arrow, mark, square};
-use super::{Look, words};
+use super::{Style, words};
 use crate::recording::Recording;
 use crate::scene::{Colouring, Ink, Mark, Scene};
 use minimal_surprise_sim::damage::Damage;
 
-/// Room for a symbol before its meaning, in heights of words.
+/// Width of a symbol before its meaning, in text heights.
 const SYMBOL: f64 = 1.6;
 
 /// What a colour or a mark means.
@@ -33,7 +33,7 @@ const MARKS: [Mark; 6] = [
 ];
 
 impl Legend {
-    /// Of what is to be seen.
+    /// The legend of what the scenes show.
     pub(super) fn of<'a>(
         scenes: impl IntoIterator<Item = &'a Scene>,
         colouring: Colouring,
@@ -53,12 +53,12 @@ impl Legend {
         )
     }
 
-    /// Of all that is to be seen while a run goes on.
-    pub(super) fn whole(recording: &Recording, look: &Look) -> Self {
-        let picked = look.robot.is_some();
-        let last = look.colouring != Colouring::Surprise;
+    /// The legend of everything that can appear during the run.
+    pub(super) fn whole(recording: &Recording, style: &Style) -> Self {
+        let picked = style.robot.is_some();
+        let last = style.colouring != Colouring::Surprise;
         Self::with(
-            look.colouring,
+            style.colouring,
             recording,
             |ink| ink != Ink::Named || recording.name().is_some(),
             |mark| match mark {
@@ -135,7 +135,7 @@ impl Legend {
         widths.fold(0.0, f64::max)
     }
 
-    /// Draws it in rows; says where the last one ends.
+    /// Draws it in rows; returns where the last one ends.
     pub(super) fn draw(&self, drawing: &mut Drawing, (west, north): (f64, f64), width: f64) -> f64 {
         let theme = drawing.theme;
         let words = drawing.size.words();

@@ -1,7 +1,7 @@
 //! Pictures of a run: stills as SVG and PNG, animations as GIF and MP4.
 //!
-//! A [`Drawing`] is made of a scene or of a curve ([`still`]); pixels are made of its SVG
-//! ([`raster`]), and animations of the pixels of many ([`film`]).
+//! [`still`] turns a scene or a curve into a [`Drawing`]; [`raster`] turns its SVG into pixels;
+//! [`film`] turns many of these into an animation.
 
 mod curves;
 mod drawing;
@@ -23,12 +23,12 @@ use std::io;
 /// What a still shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
-pub enum What {
+pub enum Picture {
     /// The swarm, as in the paper's Figs. 7 and 8.
     State,
     /// The swarm before the damage and after it, as in the paper's Figs. 13 and 14.
     Damage,
-    /// What robots expect around them, averaged over the run, as in the paper's Fig. 9.
+    /// What robots predict around them, averaged over the run, as in the paper's Fig. 9.
     Predictions,
     /// How many robots move, over the steps, as in the paper's Fig. 5.
     Temperature,
@@ -38,47 +38,50 @@ pub enum What {
 
 /// How a swarm is drawn.
 #[derive(Clone, Copy, Debug)]
-pub struct Look {
-    /// How large.
+pub struct Style {
+    /// How large it is.
     pub size: Size,
-    /// On which ground.
+    /// Its colours, for a light or dark background.
     pub theme: &'static Theme,
-    /// What the colours of robots say.
+    /// What the colours of robots show.
     pub colouring: Colouring,
-    /// The robot that is looked into.
+    /// The selected robot.
     pub robot: Option<usize>,
 }
 
-/// A picture cannot be made.
+/// A picture could not be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PictureError {
-    /// It has no such state.
+    /// The recording has no such state.
     #[error("there is no state {asked}; states are 0 to {last}")]
     NoState {
-        /// The one asked for.
+        /// The state asked for.
         asked: u32,
-        /// The last one.
+        /// The last state.
         last: usize,
     },
-    /// It has no such robot.
+    /// The recording has no such robot.
     #[error("there is no robot {asked}; robots are 0 to {last}")]
     NoRobot {
-        /// The one asked for.
+        /// The robot asked for.
         asked: usize,
-        /// The last one.
+        /// The last robot.
         last: usize,
     },
-    /// Nothing is known of what the robots think.
-    #[error("a trajectory does not say what robots sense and predict; a run or a genome does")]
-    NoMinds,
-    /// Nothing is known of an evolution.
-    #[error("only a run directory says how fitness evolved")]
+    /// The recording is a trajectory, which has poses only.
+    #[error(
+        "a trajectory has poses only; give a run or a genome to show what robots sense and predict"
+    )]
+    NoController,
+    /// The recording is not of a run directory, so no evolution is known.
+    #[error("only a run directory records how fitness evolved")]
     NoEvolution,
     /// Nothing was damaged.
-    #[error("nothing was damaged; say what with --remove or --reposition")]
+    #[error("nothing was damaged; damage an area with --remove or --reposition")]
     NoDamage,
-    /// Words would be cut off or cover others.
-    #[error("the words of this picture need {needed} mm")]
+    /// Text would be cut off or overlap.
+    #[error("the text of this picture needs {needed} mm")]
     TooNarrow {
         /// Least width, in millimetres.
         needed: u32,
@@ -86,21 +89,21 @@ pub enum PictureError {
     /// More pixels than a picture can have.
     #[error("{width} x {height} pixels are too many; a picture has 64 million at most")]
     TooLarge {
-        /// Pixels of a row.
+        /// Pixels per row.
         width: f64,
-        /// Rows.
+        /// Number of rows.
         height: f64,
     },
     /// A picture could not be encoded.
     #[error("the picture cannot be encoded: {0}")]
     Encoding(String),
-    /// There is no program that makes films.
+    /// ffmpeg is not installed.
     #[error(
-        "there is no program ffmpeg, which MP4 takes: install it (on Debian: apt-get install \
-         ffmpeg), or write a GIF with --gif"
+        "MP4 needs the program ffmpeg: install it (on Debian: apt-get install ffmpeg), or write a GIF \
+         with --gif"
     )]
     NoFfmpeg,
-    /// ffmpeg could not be run, or stopped.
+    /// ffmpeg could not be run, or stopped early.
     #[error("ffmpeg: {0}")]
     Ffmpeg(io::Error),
     /// ffmpeg failed.
@@ -108,34 +111,34 @@ pub enum PictureError {
     FfmpegFailed(String),
 }
 
-/// A still, of state `at` where it shows a swarm; without, of the last one with something to show.
+/// A still. `at` chooses the state of a swarm; the default is the last state with colours to show.
 ///
 /// # Errors
-/// [`PictureError`] if the recording does not have what is asked for.
+/// [`PictureError`] if the recording lacks what is asked for.
 pub fn still(
     recording: &Recording,
-    what: What,
+    what: Picture,
     at: Option<u32>,
-    look: &Look,
+    style: &Style,
 ) -> Result<Drawing, PictureError> {
     let state = || {
         let last = recording.steps();
-        let last_shown = last_shown(recording, look.colouring);
+        let last_shown = last_shown(recording, style.colouring);
         at.map_or(Ok(last_shown), |at| match at as usize {
             at if at <= last => Ok(at),
             _ => Err(PictureError::NoState { asked: at, last }),
         })
     };
     match what {
-        What::State => state::state(recording, state()?, look),
-        What::Damage => state::damage(recording, state()?, look),
-        What::Predictions => predictions::predictions(recording, look.size, look.theme),
-        What::Temperature => curves::temperature(recording, look.size, look.theme),
-        What::Fitness => curves::fitness(recording, look.size, look.theme),
+        Picture::State => state::state(recording, state()?, style),
+        Picture::Damage => state::damage(recording, state()?, style),
+        Picture::Predictions => predictions::predictions(recording, style.size, style.theme),
+        Picture::Temperature => curves::temperature(recording, style.size, style.theme),
+        Picture::Fitness => curves::fitness(recording, style.size, style.theme),
     }
 }
 
-/// The last state in which colours say something: in the final one nothing is sensed any more.
+/// The last state whose colours show something: in the final state nothing is sensed.
 fn last_shown(recording: &Recording, colouring: Colouring) -> usize {
     match colouring {
         Colouring::Surprise => recording.steps().saturating_sub(1),
@@ -143,7 +146,7 @@ fn last_shown(recording: &Recording, colouring: Colouring) -> usize {
     }
 }
 
-/// The names of the final state.
+/// The run's dominant structures.
 fn named(recording: &Recording) -> String {
     let names: Vec<&str> = recording.names.iter().map(|name| name.name()).collect();
     if names.is_empty() {

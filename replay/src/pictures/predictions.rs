@@ -1,4 +1,4 @@
-//! What robots expect around them, averaged over the run, as in the paper's Fig. 9.
+//! What robots predict around them, averaged over the run, as in the paper's Fig. 9.
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, channels};
 use super::symbols::{arrow, square};
@@ -7,22 +7,25 @@ use crate::palette::Theme;
 use crate::recording::Recording;
 use crate::scene::Ink;
 
-/// Widest cell, in heights of words: a number with two decimals has room.
+/// Widest cell, in text heights: it has room for a number with two decimals.
 const CELL_MAX: f64 = 4.5;
 
-/// Every sensor's cell with its average prediction; the robot faces up.
+/// The average prediction in every sensor's cell; the robot faces up.
 ///
 /// # Errors
-/// [`PictureError::NoMinds`] of a trajectory.
+/// [`PictureError::NoController`] of a trajectory.
 pub(super) fn predictions(
     recording: &Recording,
     size: Size,
     theme: &'static Theme,
 ) -> Result<Drawing, PictureError> {
-    let minds = recording.minds.as_ref().ok_or(PictureError::NoMinds)?;
+    let controller = recording
+        .controller
+        .as_ref()
+        .ok_or(PictureError::NoController)?;
     let words = size.words();
     let margin = size.margin();
-    let cells = minds.topology.model().cells();
+    let cells = controller.topology.model().cells();
     // The robot is one of the cells shown.
     let sides = |of_cells: Vec<i8>| {
         let least = of_cells
@@ -58,7 +61,7 @@ pub(super) fn predictions(
             header + (ahead - cell_ahead) * side,
         )
     };
-    for (cell, &average) in cells.iter().zip(&minds.average_prediction) {
+    for (cell, &average) in cells.iter().zip(&controller.average_prediction) {
         let (x, y) = corner(f64::from(cell.ahead), f64::from(cell.left));
         let fill = mixed(theme.cell, theme.named, average);
         drawing.area((x, y), (side, side), fill);
@@ -82,7 +85,7 @@ pub(super) fn predictions(
     Ok(drawing)
 }
 
-/// A colour between two of `#rrggbb`.
+/// A colour between two others, as `#rrggbb`.
 fn mixed(from: &str, to: &str, share: f64) -> String {
     let [from, to] = [from, to].map(channels);
     let mixed = [0, 1, 2].map(|channel| {
@@ -97,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mixed_colour_is_either_at_the_ends_and_between_elsewhere() {
+    fn a_mixed_colour_lies_between_the_two_and_equals_them_at_the_ends() {
         assert_eq!(mixed("#000000", "#ff8040", 0.0), "#000000");
         assert_eq!(mixed("#000000", "#ff8040", 1.0), "#ff8040");
         assert_eq!(mixed("#000000", "#ff8040", 0.5), "#804020");

@@ -4,25 +4,25 @@ use super::{Drawing, PictureError};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 
-/// Most pixels of a picture, 8 × 8 thousand.
+/// Most pixels of a picture, 8000 × 8000.
 const PIXELS_MAX: f64 = 64e6;
 
-/// Millimetres of an inch.
+/// Millimetres per inch.
 const INCH: f64 = 25.4;
 
-/// A picture of pixels, from the north-west corner by rows.
+/// A picture as pixels, row by row from the north-west corner.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pixels {
-    /// Pixels of a row.
+    /// Pixels per row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Red, green and blue of each.
+    /// Red, green and blue of each pixel.
     pub rgb: Vec<u8>,
 }
 
 impl Pixels {
-    /// A picture so many pixels wide.
+    /// The drawing scaled to this width, in pixels.
     ///
     /// # Errors
     /// [`PictureError::TooLarge`].
@@ -30,7 +30,7 @@ impl Pixels {
         let tree = Tree::from_str(&drawing.svg(), &Options::default())
             .map_err(|error| PictureError::Encoding(error.to_string()))?;
         let scale = f64::from(width) / f64::from(tree.size().width());
-        // Rows that are covered wholly: of a part of one, the ground would be seen through.
+        // Only rows that are covered completely: a partial row would be translucent.
         let height = (f64::from(tree.size().height()) * scale).floor().max(1.0);
         let too_large = PictureError::TooLarge {
             width: f64::from(width),
@@ -48,7 +48,7 @@ impl Pixels {
             Transform::from_scale(scale, scale),
             &mut pixmap.as_mut(),
         );
-        // The ground is opaque, so nothing is seen through.
+        // The background is opaque, so no pixel is translucent.
         let rgb = pixmap.data().chunks_exact(4).flat_map(|pixel| {
             let [red, green, blue, _] = [pixel[0], pixel[1], pixel[2], pixel[3]];
             [red, green, blue]
@@ -60,7 +60,7 @@ impl Pixels {
         })
     }
 
-    /// One pixel a pixel, for a drawing of [`super::Size::Screen`].
+    /// A drawing of [`super::Size::Screen`] at its own size, in pixels.
     ///
     /// # Errors
     /// [`PictureError::TooLarge`].
@@ -69,7 +69,7 @@ impl Pixels {
     }
 }
 
-/// A drawing of [`super::Size::Paper`] as PNG of so many dots an inch.
+/// A drawing of [`super::Size::Paper`] as PNG with this resolution.
 ///
 /// # Errors
 /// [`PictureError::TooLarge`].

@@ -1,9 +1,9 @@
-//! A swarm, or two side by side: every robot an arrow in its cell, with what is marked on cells.
+//! A swarm, or two side by side: every robot an arrow in its cell, with the marked cells.
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, line};
 use super::legend::Legend;
 use super::symbols::{area_stroke, arrow, set_off, square};
-use super::{Look, PictureError, named, symbols, words};
+use super::{PictureError, Style, named, symbols, words};
 use crate::recording::Recording;
 use crate::scene::{Colouring, Ink, Scene};
 use minimal_surprise_sim::damage::Damage;
@@ -16,10 +16,10 @@ struct Panel {
     right: Caption,
 }
 
-/// Words over a swarm.
+/// Text above a swarm.
 struct Caption {
     words: String,
-    /// The longest they get while the run goes on: what room is made for.
+    /// The longest text during the run: the space to reserve.
     longest: String,
 }
 
@@ -49,23 +49,31 @@ impl Caption {
 }
 
 /// State `t`.
-pub(super) fn state(recording: &Recording, t: usize, look: &Look) -> Result<Drawing, PictureError> {
-    let scene = scene(recording, t, look)?;
-    let legend = Legend::of([&scene], look.colouring, recording);
-    of_state(recording, t, look, scene, &legend)
+pub(super) fn state(
+    recording: &Recording,
+    t: usize,
+    style: &Style,
+) -> Result<Drawing, PictureError> {
+    let scene = scene(recording, t, style)?;
+    let legend = Legend::of([&scene], style.colouring, recording);
+    of_state(recording, t, style, scene, &legend)
 }
 
-/// State `t` as one of many, whose legend and size are the same.
-pub(super) fn frame(recording: &Recording, t: usize, look: &Look) -> Result<Drawing, PictureError> {
-    let scene = scene(recording, t, look)?;
-    let legend = Legend::whole(recording, look);
-    of_state(recording, t, look, scene, &legend)
+/// State `t` as a frame: all frames have the same legend and size.
+pub(super) fn frame(
+    recording: &Recording,
+    t: usize,
+    style: &Style,
+) -> Result<Drawing, PictureError> {
+    let scene = scene(recording, t, style)?;
+    let legend = Legend::whole(recording, style);
+    of_state(recording, t, style, scene, &legend)
 }
 
 fn of_state(
     recording: &Recording,
     t: usize,
-    look: &Look,
+    style: &Style,
     scene: Scene,
     legend: &Legend,
 ) -> Result<Drawing, PictureError> {
@@ -79,14 +87,14 @@ fn of_state(
         },
     };
     let title = format!("{}, {}", panel.left.words, panel.right.words);
-    panels(&title, &[panel], legend, look)
+    panels(&title, &[panel], legend, style)
 }
 
-/// Before the damage, and state `t` after it.
+/// The swarm before the damage, and state `t` after it.
 pub(super) fn damage(
     recording: &Recording,
     t: usize,
-    look: &Look,
+    style: &Style,
 ) -> Result<Drawing, PictureError> {
     let damaged = recording
         .origin
@@ -94,10 +102,10 @@ pub(super) fn damage(
         .as_ref()
         .ok_or(PictureError::NoDamage)?;
     let scenes = [
-        Scene::of_poses(recording, &damaged.before, look.colouring),
-        scene(recording, t, look)?,
+        Scene::of_poses(recording, &damaged.before, style.colouring),
+        scene(recording, t, style)?,
     ];
-    let legend = Legend::of(&scenes, look.colouring, recording);
+    let legend = Legend::of(&scenes, style.colouring, recording);
     let [before, after] = scenes;
     let what = match damaged.damage {
         Damage::Remove(_) => "removal",
@@ -110,7 +118,7 @@ pub(super) fn damage(
     let panels = panels.map(|(scene, when)| {
         let members = scene.robots.iter().filter(|robot| robot.ink == Ink::Named);
         let (members, robots) = (members.count(), scene.robots.len());
-        let count = match (look.colouring, recording.name()) {
+        let count = match (style.colouring, recording.name()) {
             (Colouring::Structure, Some(name)) => format!("{name} {members} of {robots}"),
             _ => format!("{robots} robots"),
         };
@@ -121,26 +129,27 @@ pub(super) fn damage(
         }
     });
     let title = format!("{}; {}", panels[0].left.words, panels[1].left.words);
-    self::panels(&title, &panels, &legend, look)
+    self::panels(&title, &panels, &legend, style)
 }
 
-fn scene(recording: &Recording, t: usize, look: &Look) -> Result<Scene, PictureError> {
+fn scene(recording: &Recording, t: usize, style: &Style) -> Result<Scene, PictureError> {
     let robots = recording.robots();
-    if let Some(asked) = look.robot.filter(|&robot| robot >= robots) {
+    if let Some(asked) = style.robot.filter(|&robot| robot >= robots) {
         return Err(PictureError::NoRobot {
             asked,
             last: robots.saturating_sub(1),
         });
     }
-    if recording.minds.is_none() && (look.robot.is_some() || look.colouring == Colouring::Surprise)
+    if recording.controller.is_none()
+        && (style.robot.is_some() || style.colouring == Colouring::Surprise)
     {
-        return Err(PictureError::NoMinds);
+        return Err(PictureError::NoController);
     }
-    Ok(Scene::of(recording, t, look.colouring, look.robot))
+    Ok(Scene::of(recording, t, style.colouring, style.robot))
 }
 
-/// Width of a panel and side of a cell: on a screen the cells say how large a picture gets, on
-/// paper its width how large they get.
+/// Width of a panel and side of a cell. On a screen, the cells determine the size of the picture;
+/// on paper, the width of the picture determines the size of the cells.
 fn layout(
     panels: &[Panel],
     legend: &Legend,
@@ -155,7 +164,7 @@ fn layout(
     match size {
         Size::Paper(width) => {
             let between = gap * (count - 1.0);
-            // Between panels, words may reach into the gap.
+            // Text may extend into the gap between panels.
             let captions = count * widest + between / 2.0;
             let needed = captions.max(legend.widest(size)) + 2.0 * size.margin();
             if needed > width {
@@ -168,13 +177,13 @@ fn layout(
         Size::Screen(side) => {
             let side = f64::from(side);
             let words = widest.max(legend.widest(size));
-            // A pixel more, for the line at the end.
+            // One more pixel, for the last grid line.
             Ok((size.whole((columns * side + 1.0).max(words)), side))
         }
     }
 }
 
-/// Cells of the widest and of the highest panel.
+/// Columns of the widest and rows of the highest panel.
 fn cells(panels: &[Panel]) -> (f64, f64) {
     let most = |of: fn(&Scene) -> u16| {
         let sides = panels.iter().map(|panel| f64::from(of(&panel.scene)));
@@ -187,9 +196,9 @@ fn panels(
     title: &str,
     panels: &[Panel],
     legend: &Legend,
-    look: &Look,
+    style: &Style,
 ) -> Result<Drawing, PictureError> {
-    let size = look.size;
+    let size = style.size;
     let (words, margin) = (size.words(), size.margin());
     let gap = size.whole(1.5 * words);
     let count = panels.len() as f64;
@@ -201,12 +210,12 @@ fn panels(
         .iter()
         .all(|of| of.left.width(size) + of.right.width(size) + 1.5 * words <= panel);
     let header = margin + line_height * if one_line { 1.0 } else { 2.0 };
-    // A line of one pixel is sharp in the middle of pixels.
+    // A one-pixel line is sharp at the middle of a pixel.
     let half = match size {
         Size::Paper(_) => 0.0,
         Size::Screen(_) => 0.5,
     };
-    let mut drawing = Drawing::new(size, look.theme, title);
+    let mut drawing = Drawing::new(size, style.theme, title);
     for (index, of) in panels.iter().enumerate() {
         let west = margin + (panel + gap) * index as f64;
         let first = margin + line_height * 0.4;
@@ -214,14 +223,14 @@ fn panels(
             &of.left.words,
             Anchor::Start,
             (west, first),
-            look.theme.text,
+            style.theme.text,
         );
         let (anchor, at) = if one_line {
             (Anchor::End, (west + panel, first))
         } else {
             (Anchor::Start, (west, first + line_height))
         };
-        drawing.words(&of.right.words, anchor, at, look.theme.soft);
+        drawing.words(&of.right.words, anchor, at, style.theme.soft);
         let inside = panel - columns * side;
         let corner = (west + size.floor(inside / 2.0) + half, header + half);
         swarm(&mut drawing, &of.scene, corner, side);
@@ -238,7 +247,7 @@ fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f64), side: 
     let (width, height) = (f64::from(scene.width), f64::from(scene.height));
     let (east, south) = (west + width * side, north + height * side);
     drawing.area((west, north), (east - west, south - north), theme.cell);
-    // The page counts rows from the south, pictures from the north.
+    // The grid counts rows from the south, pictures from the north.
     let corner = |x: u16, y: u16| {
         (
             west + f64::from(x) * side,
@@ -289,7 +298,7 @@ fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f64), side: 
     area(drawing, scene, corner, side);
 }
 
-/// The outline of the damaged cells; where they go on across the edge it is open.
+/// The outline of the damaged cells; open where the area continues across the edge.
 fn area(drawing: &mut Drawing, scene: &Scene, corner: impl Fn(u16, u16) -> (f64, f64), side: f64) {
     let is_inside = |x: u16, y: u16| scene.area.contains(&[x % scene.width, y % scene.height]);
     let mut outline = Data::new();

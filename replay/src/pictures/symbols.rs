@@ -1,4 +1,4 @@
-//! Robots and marks, each in a cell with this north-west corner and side.
+//! Robots and marks, each in a cell given by its north-west corner and side.
 
 use super::drawing::{Drawing, Stroke, line, polygon};
 use crate::palette::{ARROW, is_hollow};
@@ -21,7 +21,7 @@ pub(super) fn arrow(drawing: &mut Drawing, corner: (f64, f64), side: f64, headin
     }
 }
 
-/// Sets a robot off from a mark under it, which may have its colour.
+/// Separates a robot from a mark under it, which may have the same colour.
 pub(super) fn set_off(drawing: &mut Drawing, corner: (f64, f64), side: f64, heading: u8) {
     let outline = outline(corner, side, heading);
     let colour = drawing.theme.cell;
@@ -46,7 +46,7 @@ fn outline((west, north): (f64, f64), side: f64, heading: u8) -> Data {
     }))
 }
 
-/// A mark, which lies under the robots so that their headings stay visible.
+/// A mark. Marks lie under the robots so that headings stay visible.
 pub(super) fn mark(drawing: &mut Drawing, mark: Mark, (west, north): (f64, f64), side: f64) {
     let colour = drawing.theme.mark(mark);
     let stroke = |share: f64| Stroke {
@@ -71,7 +71,7 @@ pub(super) fn mark(drawing: &mut Drawing, mark: Mark, (west, north): (f64, f64),
     }
 }
 
-/// A cross to the corners of a cell, which a robot's arrow leaves free.
+/// A cross to the corners of a cell, which the robot's arrow does not cover.
 fn cross(drawing: &mut Drawing, (west, north): (f64, f64), side: f64, stroke: Stroke<'_>) {
     let (near, far) = (0.06 * side, 0.94 * side);
     let mut cross = line(&[(west + near, north + near), (west + far, north + far)]);
@@ -82,7 +82,7 @@ fn cross(drawing: &mut Drawing, (west, north): (f64, f64), side: f64, stroke: St
     drawing.stroked(cross, stroke);
 }
 
-/// How the damaged area is outlined.
+/// The line around the damaged area.
 pub(super) fn area_stroke(drawing: &Drawing, side: f64) -> Stroke<'static> {
     Stroke {
         colour: drawing.theme.expects,
@@ -103,7 +103,7 @@ fn ring((west, north): (f64, f64), side: f64, radius: f64) -> Data {
     polygon(&corners.collect::<Vec<_>>())
 }
 
-/// A square that leaves this share of the cell free on all sides.
+/// A square that leaves this share of the cell free on each side.
 pub(super) fn square((west, north): (f64, f64), side: f64, inset: f64) -> Data {
     let (near, far) = (inset * side, (1.0 - inset) * side);
     polygon(&[

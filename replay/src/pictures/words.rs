@@ -1,12 +1,12 @@
-//! Words as outlines, in the bundled font: a picture looks the same wherever it is opened, with
-//! whatever fonts are there.
+//! Text as outlines, in the bundled font: a picture looks the same everywhere, whatever fonts are
+//! installed.
 
 use super::drawing::rounded;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 use svg::node::element::path::{Command, Data};
 
-/// Inter, the letters of ASCII and a few signs; see `fonts/README.md`.
+/// Inter: the ASCII characters and a few signs; see `fonts/README.md`.
 static FONT: LazyLock<Font> = LazyLock::new(|| {
     let font = Font::parse(include_str!("../../fonts/inter-outlines.tsv"));
     font.expect("the bundled font is well-formed")
@@ -40,7 +40,7 @@ impl Font {
         })
     }
 
-    /// A letter that the font lacks is a question mark.
+    /// The letter; a question mark if the font lacks it.
     fn letter(&self, letter: char) -> &Letter {
         let found = self.letters.get(&letter);
         found.unwrap_or_else(|| &self.letters[&'?'])
@@ -51,16 +51,16 @@ impl Font {
     }
 }
 
-/// Height of capitals and digits, as a share of the size.
+/// Height of capitals and digits, as a share of the font size.
 pub(super) const CAPITALS: f64 = 0.727;
 
-/// How wide words are in some size.
+/// Width of a text at this font size.
 pub(super) fn width(words: &str, size: f64) -> f64 {
     let advances = words.chars().map(|letter| FONT.letter(letter).advance);
     advances.sum::<f64>() * FONT.scale(size)
 }
 
-/// The outlines of words that start at `x` and stand on `y`.
+/// The outlines of a text that starts at `x` with its baseline at `y`.
 pub(super) fn outlines(words: &str, size: f64, (mut x, y): (f64, f64)) -> Data {
     let scale = FONT.scale(size);
     let mut data = Data::new();
@@ -93,14 +93,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_are_as_wide_as_their_letters_and_grow_with_the_size() {
+    fn text_is_as_wide_as_its_letters_and_grows_with_the_size() {
         let (one, two) = (width("line", 10.0), width("lineline", 10.0));
         assert!((2.0 * one - two).abs() < 1e-9, "{one} {two}");
         assert!((width("line", 20.0) - two).abs() < 1e-9);
     }
 
     #[test]
-    fn every_letter_that_pictures_use_is_in_the_font() {
+    fn every_character_that_pictures_use_is_in_the_font() {
         let used = (' '..='~').chain("·×–…−".chars());
         let missing: String = used.filter(|c| !FONT.letters.contains_key(c)).collect();
         assert_eq!(missing, "");

@@ -1,4 +1,4 @@
-//! A scene as characters, two to a cell: on the left what is marked there, on the right the robot.
+//! A scene as text, two characters per cell: the mark on the left, the robot on the right.
 
 use super::paints::{Paints, soft};
 use crate::palette::is_hollow;
@@ -9,17 +9,17 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use std::ops::Range;
 
-/// Columns of a cell.
+/// Columns per cell.
 pub const COLUMNS: u16 = 2;
 
-/// What the area that was damaged is shaded with.
+/// Shades the damaged area.
 pub const AREA: char = '░';
 
-/// Beside a robot that is more surprised than its arrow can say.
+/// Stands beside a robot of the highest level of surprise, for which there is no larger arrow.
 pub const MOST_SURPRISED: char = '!';
 
-/// The arrow of a robot. A robot of another structure than the named one is small, one of none
-/// hollow; the more surprised, the larger.
+/// The arrow of a robot: small for structures other than the dominant one, hollow for none; larger
+/// the more surprised the robot is.
 #[must_use]
 pub fn robot(robot: Robot) -> char {
     let heading = Heading::ALL[usize::from(robot.heading) % Heading::ALL.len()];
@@ -39,7 +39,7 @@ fn small_arrow(heading: Heading) -> char {
     }
 }
 
-/// Squares are hits, crosses misses, rings are yet to be sensed; filled or thick where there is a
+/// Squares are hits, crosses are misses, rings are not sensed yet; filled or thick where there is a
 /// robot.
 #[must_use]
 pub fn mark(mark: Mark) -> char {
@@ -53,7 +53,7 @@ pub fn mark(mark: Mark) -> char {
     }
 }
 
-/// A part of a scene as lines, the northernmost first.
+/// A part of a scene as lines, from north to south.
 #[must_use]
 pub fn lines(scene: &Scene, x: Range<u16>, y: Range<u16>, paints: Paints) -> Vec<Line<'static>> {
     let width = usize::from(scene.width);
@@ -67,7 +67,7 @@ pub fn lines(scene: &Scene, x: Range<u16>, y: Range<u16>, paints: Paints) -> Vec
         let cell = &mut cells[at(drawn.x, drawn.y)];
         let mut style = paints.ink(drawn.ink);
         if scene.picked == Some(index) {
-            // In the terminal's own colours: a hue behind the arrow would hide it.
+            // In the terminal's own colours: a coloured background would hide the arrow.
             style = Style::new().bold().reversed();
             cell[0] = (' ', style);
         }

@@ -1,7 +1,7 @@
-//! Replays in the terminal: one state at a time, with keys.
+//! Replays in the terminal: one state at a time, controlled by keys.
 //!
-//! [`player`] is what the keys move, [`screen`] draws it, of the characters of [`cells`] in the
-//! paints of [`paints`].
+//! [`player`] holds what the keys change; [`screen`] draws it with the characters of [`cells`] and
+//! the colours of [`paints`].
 
 pub mod cells;
 pub mod paints;
@@ -18,17 +18,17 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Longest wait for a key before it is looked whether to end.
+/// Longest wait for a key before checking whether to end.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Shortest wait: without any, no key would ever be seen where drawing is slow.
+/// Shortest wait: without it, keys would never be read where drawing is slow.
 const A_LOOK: Duration = Duration::from_millis(1);
 
-/// Plays a recording until a key, or `stop`, ends it; in ASCII where the terminal's locale knows
-/// nothing else. Afterwards the terminal is restored, after a panic too.
+/// Plays a recording until a key or `stop` ends it; in ASCII if the terminal's locale supports
+/// nothing else. Restores the terminal afterwards, even after a panic.
 ///
 /// # Errors
-/// If there is no terminal, or it goes away.
+/// If there is no terminal, or it is closed.
 pub fn play(
     recording: &Recording,
     colouring: Colouring,
@@ -39,7 +39,7 @@ pub fn play(
     let mut player = Player::new(recording, colouring);
     let played = ratatui::try_init()
         .and_then(|mut terminal| watch(&mut terminal, &mut player, paints, ascii, stop));
-    // Also if it began and could not go on.
+    // Even if setting it up failed halfway.
     let restored = ratatui::try_restore();
     played.and(restored)
 }
@@ -53,8 +53,8 @@ fn watch(
 ) -> io::Result<()> {
     let mut last = Instant::now();
     while !stop.load(Ordering::Relaxed) {
-        // Also when nothing has happened: a window that changed before its changes were listened to
-        // is met with the next look. Only cells that differ are written.
+        // Draws even if nothing has happened: a resize before the first event is noticed here. Only
+        // cells that differ are written.
         terminal.draw(|frame| {
             screen::draw(frame, player, paints);
             if ascii {

@@ -1,25 +1,25 @@
-//! Colours for terminals whose ground nobody knows: readable on light and on dark, in as many
-//! colours as the terminal has.
+//! Colours for terminals with an unknown background: readable on light and dark, in as many colours
+//! as the terminal has.
 
 use crate::palette::{LIGHT, Theme};
 use crate::scene::{Ink, Mark};
 use anstyle::RgbColor;
 use ratatui::style::{Color, Modifier, Style};
 
-/// The hues for light ground are dark enough for it and light enough for black; where the theme is
-/// grey, the terminal's own colour of words is taken instead.
+/// The hues for a light background are dark enough for it and light enough for a dark one. Instead
+/// of the theme's greys, the terminal's own text colour is used.
 const HUES: Theme = LIGHT;
 
-/// How many colours a terminal has.
+/// How many colours to use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Paints {
-    /// None, or none are wanted.
+    /// None.
     None,
-    /// The sixteen whose look is the user's affair.
+    /// The 16 basic colours, which the user's terminal defines.
     Sixteen,
-    /// 256 known ones.
+    /// The 256 indexed colours.
     Indexed,
-    /// All.
+    /// 24-bit colours.
     True,
 }
 
@@ -36,7 +36,7 @@ impl Paints {
         Style::new().fg(colour)
     }
 
-    /// The hue of the named structure.
+    /// The hue of the dominant structure.
     #[must_use]
     pub fn named(self) -> Style {
         self.paint(HUES.named, Color::Cyan)
@@ -48,13 +48,13 @@ impl Paints {
         self.paint(HUES.other, Color::Yellow)
     }
 
-    /// The hue of what was predicted right.
+    /// The hue of correct predictions.
     #[must_use]
     pub fn hit(self) -> Style {
         self.paint(HUES.hit, Color::Green)
     }
 
-    /// How robots look.
+    /// The style of a robot.
     #[must_use]
     pub fn ink(self, ink: Ink) -> Style {
         match ink {
@@ -68,7 +68,7 @@ impl Paints {
         }
     }
 
-    /// How marks look.
+    /// The style of a mark.
     #[must_use]
     pub fn mark(self, mark: Mark) -> Style {
         let of_sixteen = match mark {
@@ -79,20 +79,20 @@ impl Paints {
         self.paint(HUES.mark(mark), of_sixteen).bold()
     }
 
-    /// How the area that was damaged looks.
+    /// The style of the damaged area.
     #[must_use]
     pub fn area(self) -> Style {
         self.paint(HUES.expects, Color::Magenta)
     }
 
-    /// How what needs attention looks.
+    /// The style of warnings.
     #[must_use]
     pub fn warning(self) -> Style {
         self.paint(HUES.miss, Color::Red).bold()
     }
 }
 
-/// How what matters less looks.
+/// The style of secondary text.
 #[must_use]
 pub fn soft() -> Style {
     Style::new().add_modifier(Modifier::DIM)
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn inks_and_marks_stay_apart_in_few_colours_and_have_none_where_none_are_wanted() {
+    fn inks_and_marks_differ_in_few_colours_and_have_none_if_none_are_wanted() {
         for paints in [Paints::Sixteen, Paints::Indexed, Paints::True] {
             let inks = [
                 paints.named(),

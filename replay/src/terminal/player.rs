@@ -6,42 +6,42 @@ use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use std::ops::Range;
 use std::time::Duration;
 
-/// Steps a second to choose from.
+/// Speeds to choose from, in steps per second.
 pub const SPEEDS: [u32; 8] = [1, 2, 5, 10, 20, 50, 100, 200];
 
-/// Steps of a jump.
+/// Steps per jump.
 pub const JUMP: usize = 10;
 
-/// Cells that the view moves by at a key.
+/// Cells that a key scrolls the view by.
 const SCROLL: i32 = 5;
 
-/// Cells around a robot that stay in view: none senses farther.
+/// Cells around a robot that stay in view: no sensor reaches farther.
 const MARGIN: u16 = 3;
 
-/// A recording being looked at.
+/// Plays a recording.
 #[derive(Clone, Debug)]
 pub struct Player<'a> {
-    /// What is played.
+    /// The recording.
     pub recording: &'a Recording,
     /// The state that is shown, 0 to T.
     pub t: usize,
-    /// Whether it goes on by itself.
+    /// Whether it is playing.
     pub playing: bool,
-    /// Whether the swarm is shown as it was before it was damaged.
+    /// Whether the swarm before the damage is shown.
     pub before: bool,
-    /// What the colours of robots say.
+    /// What the colours of robots show.
     pub colouring: Colouring,
-    /// The robot that is looked into.
+    /// The selected robot.
     pub picked: Option<usize>,
     speed: usize,
-    /// The south-west cell of the view, if it does not show all.
+    /// The south-west cell of the view, if the view does not show the whole grid.
     corner: [u16; 2],
-    /// Whether the view moves along with the robot that is looked into.
+    /// Whether the view follows the selected robot.
     following: bool,
 }
 
 impl<'a> Player<'a> {
-    /// At the start, waiting.
+    /// Paused at the start.
     #[must_use]
     pub fn new(recording: &'a Recording, colouring: Colouring) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl<'a> Player<'a> {
         }
     }
 
-    /// What is to be drawn.
+    /// The scene to draw.
     #[must_use]
     pub fn scene(&self) -> Scene {
         match &self.recording.origin.damage {
@@ -68,25 +68,25 @@ impl<'a> Player<'a> {
         }
     }
 
-    /// Steps a second.
+    /// Steps per second.
     #[must_use]
     pub fn speed(&self) -> u32 {
         SPEEDS[self.speed]
     }
 
-    /// Time from a step to the next; none while it waits.
+    /// Time from one step to the next; `None` while paused.
     #[must_use]
     pub fn pause(&self) -> Option<Duration> {
         self.playing.then(|| Duration::from_secs(1) / self.speed())
     }
 
-    /// Plays one step more, and waits at the last.
+    /// Plays one more step, and pauses at the last.
     pub fn go_on(&mut self) {
         self.t = (self.t + 1).min(self.recording.steps());
         self.playing = self.t < self.recording.steps();
     }
 
-    /// Does what a key says; says whether that is to end.
+    /// Handles a key; returns whether to quit.
     pub fn key(&mut self, key: KeyEvent) -> bool {
         if key.kind == KeyEventKind::Release {
             return false;
@@ -136,7 +136,7 @@ impl<'a> Player<'a> {
         self.before = false;
     }
 
-    /// Picks the next robot, or the one before; at first the first or the last.
+    /// Selects the next or previous robot; at first, the first or last.
     fn pick(&mut self, by: i64) {
         let robots = self.recording.robots() as i64;
         let from = self.picked.map_or(by.min(0), |robot| robot as i64 + by);
@@ -144,10 +144,10 @@ impl<'a> Player<'a> {
         self.following = true;
     }
 
-    /// Of a trajectory nothing but poses is known.
+    /// The next colouring; trajectories have no surprise.
     fn next_colouring(&self) -> Colouring {
         match self.colouring {
-            Colouring::Structure if self.recording.minds.is_some() => Colouring::Surprise,
+            Colouring::Structure if self.recording.controller.is_some() => Colouring::Surprise,
             Colouring::Structure | Colouring::Surprise => Colouring::Plain,
             Colouring::Plain => Colouring::Structure,
         }
@@ -159,8 +159,7 @@ impl<'a> Player<'a> {
         self.following = false;
     }
 
-    /// The cells, from west and from south, that a view of so many shows; a robot that is followed
-    /// is among them.
+    /// The columns and rows of cells that a view of this size shows, including a followed robot.
     pub fn view(&mut self, columns: u16, rows: u16) -> [Range<u16>; 2] {
         let grid = self.recording.grid;
         let poses = self.recording.poses(self.t);

@@ -1,4 +1,4 @@
-//! The screen: whose run it is, the swarm, what is known of it, where in time it is, the keys.
+//! The screen: the run, the swarm, details beside it, the time, the keys.
 
 use super::cells::{self, COLUMNS};
 use super::paints::{Paints, soft};
@@ -18,22 +18,22 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{LineGauge, Sparkline, SparklineBar};
 use std::path::Path;
 
-/// Fewest columns beside the swarm for what is known of it.
+/// Fewest columns for the details beside the swarm.
 const PANEL: u16 = 34;
 
-/// Most columns for it.
+/// Most columns for the details.
 const WIDE_PANEL: u16 = 64;
 
-/// Rows for what is known of it at its longest.
+/// Most rows of details.
 const PANEL_ROWS: u16 = 24;
 
-/// Columns between the swarm and what is known of it.
+/// Columns between the swarm and the details.
 const GAP: u16 = 3;
 
-/// The parts of a full bar.
+/// The value of a full bar.
 const FULL: f64 = 1000.0;
 
-/// The keys that every replay has.
+/// The keys of every replay.
 const KEYS: [(&str, &str); 8] = [
     ("q", "quit"),
     ("space", "play"),
@@ -48,7 +48,7 @@ const KEYS: [(&str, &str); 8] = [
 /// Draws everything.
 pub fn draw(frame: &mut Frame<'_>, player: &mut Player<'_>, paints: Paints) {
     let scene = player.scene();
-    // In a low window the swarm comes first, then the time.
+    // In a low window the swarm takes precedence, then the time.
     let low = frame.area().height < 8;
     let [title, middle, crop, time, keys] =
         block(frame.area(), &scene).layout(&Layout::vertical([
@@ -98,7 +98,7 @@ pub fn to_ascii(buffer: &mut Buffer) {
     }
 }
 
-/// As much of the window as is of use: what belongs together stands together.
+/// The part of the window that is used, so that the parts of the screen stay close together.
 fn block(window: Rect, scene: &Scene) -> Rect {
     let columns = COLUMNS.saturating_mul(scene.width);
     Rect {
@@ -110,12 +110,12 @@ fn block(window: Rect, scene: &Scene) -> Rect {
     }
 }
 
-/// Where the swarm is drawn, where what is known of it, and where is said that it is cropped. What
-/// is known gives way where the whole swarm fits without it.
+/// Where the swarm, the details and the note on cropping are drawn. The details are left out where
+/// the whole swarm fits only without them.
 fn sides(scene: &Scene, middle: Rect, crop: Rect) -> (Rect, Option<Rect>, Option<Rect>) {
     let columns = COLUMNS.saturating_mul(scene.width);
     let rows = scene.height;
-    // The line that would say so can be the swarm's last.
+    // The line of the note can be the swarm's last.
     let whole = Rect {
         height: middle.height + crop.height,
         ..middle
@@ -152,16 +152,16 @@ fn draw_title(frame: &mut Frame<'_>, area: Rect, player: &Player<'_>, paints: Pa
     let name = name.map_or(origin.name.clone(), |name| name.display().to_string());
     let mut first = vec![name.bold(), recording.grid.to_string().into()];
     first.push(format!("{} robots", recording.robots()).into());
-    first.push(match &recording.minds {
-        Some(minds) => describe(minds.topology).into(),
+    first.push(match &recording.controller {
+        Some(controller) => describe(controller.topology).into(),
         None => "poses only".into(),
     });
     if origin.noise > 0.0 {
         first.push(format!("noise {}", origin.noise).into());
     }
     let mut second = vec![in_words(&recording.names).bold()];
-    if let Some(minds) = &recording.minds {
-        second.push(match so_far(&minds.fitness, player.t) {
+    if let Some(controller) = &recording.controller {
+        second.push(match so_far(&controller.fitness, player.t) {
             Some(fitness) => format!("fitness so far {fitness:.4}").into(),
             None => "fitness so far –".into(),
         });
@@ -176,7 +176,7 @@ fn draw_title(frame: &mut Frame<'_>, area: Rect, player: &Player<'_>, paints: Pa
         let hash = hash.to_string();
         second.push(match &origin.steps_hash {
             Some(recorded) if recorded.hash != hash => {
-                Span::styled("not the steps that the run wrote down", paints.warning())
+                Span::styled("not identical to the recorded run", paints.warning())
             }
             _ => format!("steps {}", short(&hash)).into(),
         });
@@ -244,7 +244,7 @@ fn draw_panel(
 struct Chart {
     label: String,
     now: String,
-    /// One value a state, 0 to 1.
+    /// One value per state, 0 to 1.
     values: Vec<f64>,
     style: Style,
 }
@@ -261,8 +261,13 @@ fn charts(recording: &Recording, t: usize, paints: Paints) -> Vec<Chart> {
             .collect(),
     };
     let mut charts = Vec::new();
-    if let Some(minds) = &recording.minds {
-        charts.push(of_steps("fitness so far", &minds.fitness, 4, paints.hit()));
+    if let Some(controller) = &recording.controller {
+        charts.push(of_steps(
+            "fitness so far",
+            &controller.fitness,
+            4,
+            paints.hit(),
+        ));
     }
     charts.push(of_steps(
         "temperature",
@@ -284,7 +289,7 @@ fn charts(recording: &Recording, t: usize, paints: Paints) -> Vec<Chart> {
 }
 
 impl Chart {
-    /// A column stands for the mean of its states, or several for one; what is yet to come is faint.
+    /// A column shows the mean of its states, or several columns show one; future states are faint.
     fn bars(&self, columns: u16, player: &Player<'_>) -> Sparkline<'static> {
         let states = self.values.len();
         let columns = usize::from(columns);
@@ -309,11 +314,11 @@ fn damage(player: &Player<'_>, paints: Paints) -> Vec<Line<'static>> {
     };
     let done = match damaged.damage {
         Damage::Remove(_) => "removed",
-        Damage::Reposition(_) => "put elsewhere",
+        Damage::Reposition(_) => "repositioned",
     };
     let area = Span::styled(cells::AREA.to_string().repeat(2), paints.area());
     let toggle = if player.before {
-        "as it was before    b the run"
+        "before damage    b shows the run"
     } else {
         "b shows the swarm before"
     };
@@ -324,7 +329,7 @@ fn damage(player: &Player<'_>, paints: Paints) -> Vec<Line<'static>> {
     ]
 }
 
-/// The robot that is looked into, and what its marks say.
+/// The selected robot, and the key to its marks.
 fn picked(player: &Player<'_>, scene: &Scene, paints: Paints) -> Vec<Line<'static>> {
     let Some((robot, at)) = scene.picked.and_then(|robot| {
         let at = scene.robots.get(robot)?;
@@ -351,8 +356,8 @@ fn picked(player: &Player<'_>, scene: &Scene, paints: Paints) -> Vec<Line<'stati
         format!("robot {robot}").bold(),
         format!(" at {},{} facing {facing}", at.x, at.y).into(),
     ])];
-    if player.recording.minds.is_none() {
-        lines.push("nothing is known of its mind".into());
+    if player.recording.controller.is_none() {
+        lines.push("predictions are unknown".into());
     } else if player.t == player.recording.steps() {
         lines.push(key("expects", [Mark::ExpectsOccupied, Mark::ExpectsEmpty]));
     } else {
@@ -360,13 +365,13 @@ fn picked(player: &Player<'_>, scene: &Scene, paints: Paints) -> Vec<Line<'stati
             [Mark::HitOccupied, Mark::HitEmpty],
             [Mark::MissOccupied, Mark::MissEmpty],
         );
-        lines.push(key(&format!("foreseen {:>2}", count(hits)), hits));
+        lines.push(key(&format!("as predicted {:>2}", count(hits)), hits));
         lines.push(key(&format!("mispredicted {:>2}", count(misses)), misses));
     }
     lines.push(Line::styled(
-        match player.recording.minds {
-            Some(_) => "left of their cells    Esc lets go",
-            None => "Esc lets it go",
+        match player.recording.controller {
+            Some(_) => "left of each cell    Esc deselects",
+            None => "Esc deselects",
         },
         soft(),
     ));
@@ -374,7 +379,7 @@ fn picked(player: &Player<'_>, scene: &Scene, paints: Paints) -> Vec<Line<'stati
     lines
 }
 
-/// What the arrows say.
+/// What the arrows mean.
 fn legend(player: &Player<'_>, paints: Paints) -> Vec<Line<'static>> {
     let arrow = |ink| {
         let (x, y, heading) = (0, 0, Heading::East as u8);
@@ -404,10 +409,10 @@ fn legend(player: &Player<'_>, paints: Paints) -> Vec<Line<'static>> {
                 paints.ink(Ink::Surprise(3)),
             );
             vec![
-                entry(Ink::Surprise(0), "not surprised".to_owned()),
-                entry(Ink::Surprise(1), "by up to 1/8 of its sensors".to_owned()),
-                entry(Ink::Surprise(2), "by up to 1/4".to_owned()),
-                Line::from_iter([most, arrow(Ink::Surprise(3)), "by more".into()]),
+                entry(Ink::Surprise(0), "no sensor mispredicted".to_owned()),
+                entry(Ink::Surprise(1), "up to 1/8".to_owned()),
+                entry(Ink::Surprise(2), "up to 1/4".to_owned()),
+                Line::from_iter([most, arrow(Ink::Surprise(3)), "more".into()]),
             ]
         }
     }
@@ -457,7 +462,7 @@ mod tests {
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
 
-    /// A pair that faces east and west, a robot that drives north, and one that turns.
+    /// A pair facing east and west, a robot driving north, and one that turns.
     fn recording() -> Recording {
         let states = [
             "2, 3, 1, 0|3, 3, -1, 0|0, 0, 0, 1|5, 1, 0, -1",
@@ -487,7 +492,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wide_window_shows_swarm_and_what_is_known_of_it_side_by_side() {
+    fn a_wide_window_shows_swarm_and_details_side_by_side() {
         let recording = recording();
         let mut player = Player::new(&recording, Colouring::Structure);
         press(&mut player, KeyCode::Right);
@@ -502,8 +507,8 @@ mod tests {
             " · · · · · · ·",
             "                 ███████████████████████████████████████████████████████████████",
             "                 robot 0 at 2,3 facing east",
-            "                 nothing is known of its mind",
-            "                 Esc lets it go",
+            "                 predictions are unknown",
+            "                 Esc deselects",
             "",
             "                 ▶ pair",
             "                 ▸ another structure",
@@ -516,7 +521,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_of_60_columns_says_how_to_quit() {
+    fn a_window_of_60_columns_shows_how_to_quit() {
         let recording = recording();
         let mut player = Player::new(&recording, Colouring::Plain);
         let keys = screen(&mut player, 60, 18).pop();
@@ -581,7 +586,7 @@ mod tests {
     }
 
     #[test]
-    fn the_known_of_a_mind_is_drawn_with_every_ink_and_mark() {
+    fn every_ink_and_mark_is_drawn() {
         let topology = Topology::default();
         let genome = Genome::random(topology, &mut ChaCha8Rng::seed_from_u64(1));
         let grid = Grid::new(9, 9).unwrap();
