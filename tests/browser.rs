@@ -240,7 +240,9 @@ fn a_click_on_a_robot_shows_what_it_predicts_and_senses() {
           return [box.left + (x + 0.5) * box.width / 15, box.top + (14.5 - y) * box.height / 15]; })()",
     );
     browser.click(x, y);
-    browser.wait_for("document.getElementById('world-model-text').textContent.startsWith('Robot 17 ')");
+    browser.wait_for(
+        "document.getElementById('world-model-text').textContent.startsWith('Robot 17 ')",
+    );
     let recording = recording_of(&evolver, "runs/run");
     let (sensed, predicted) = (recording.sensed(50, 17), recording.predicted(50, 17));
     let right = 14 - sensed.unwrap().differing(predicted.unwrap());

@@ -4,7 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const CRATES: [&str; 4] = ["robot-slots", "robot-link", "evolution", "evolver"];
+const CRATES: [&str; 5] = [
+    "robot-slots",
+    "robot-link",
+    "evolution",
+    "replay",
+    "evolver",
+];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {

@@ -309,7 +309,10 @@ fn a_port_with_a_blank_or_a_line_end_is_shown_in_one_line_and_can_be_typed() {
         symlink(&robot.device.port, evolver.folder().join(port)).unwrap();
         let port = format!("--port={port}");
         let run = evolver.run(&["hil", "new.genome", &port]);
-        assert_refused(&run, &["write that genome to it with: evolver flash new.genome"]);
+        assert_refused(
+            &run,
+            &["write that genome to it with: evolver flash new.genome"],
+        );
         let (_, line) = run.stderr.split_once("with: evolver ").unwrap();
         let program = evolver.program().display();
         let typed = evolver.shell(&format!("{program} {line}"));
@@ -686,7 +689,10 @@ fn wait_applies_only_to_the_first_answer() {
                 let started = Instant::now();
                 let run = evolver.run(&["flash", "new.genome", "--port", port, "--wait", wait]);
                 let waited = started.elapsed().as_secs_f64();
-                assert_failed(&run, &["the robot stopped answering while it was receiving"]);
+                assert_failed(
+                    &run,
+                    &["the robot stopped answering while it was receiving"],
+                );
                 // Five attempts of half a second.
                 assert!((2.5..20.0).contains(&waited), "{wait}: {waited}");
             });

@@ -198,7 +198,10 @@ fn a_selected_robot_shows_what_it_senses_and_what_it_had_predicted() {
         }
         let rows = terminal.screen().contents();
         let (predicted, missed) = (hits, cells.len() - hits);
-        assert!(rows.contains(&format!("as predicted {predicted:>2} ")), "{rows}");
+        assert!(
+            rows.contains(&format!("as predicted {predicted:>2} ")),
+            "{rows}"
+        );
         assert!(
             rows.contains(&format!("mispredicted {missed:>2} ")),
             "{rows}"

@@ -18,7 +18,7 @@ fn genome(topology: Topology, weights: &DVector<f64>) -> Genome {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let settings = Settings::builder().steps(100).repetitions(3).build()?;
+    let settings = Settings::builder().steps(60).repetitions(2).build()?;
     let (scenario, topology) = (settings.scenario(), settings.topology());
     let seeds = SeedTree::new(settings.seed());
     let trial = |repetition| scenario.trial(seeds, 0, repetition);
@@ -34,11 +34,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let mut optimiser = CMAESOptions::new(vec![0.0; topology.weights()], 0.3)
         .mode(Mode::Maximize)
-        .population_size(20)
+        .population_size(12)
         .seed(settings.seed())
         .build(fitness)
         .map_err(|error| format!("CMA-ES: {error:?}"))?;
-    for generation in 0..15 {
+    for generation in 0..10 {
         let stopped = optimiser.next_parallel();
         let best = optimiser.current_best_individual();
         let fitness = best.map_or(0.0, |best| best.value);

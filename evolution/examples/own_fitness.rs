@@ -30,13 +30,13 @@ impl Fitness for Moves {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = Settings::builder()
         .robots(60)
-        .steps(100)
-        .population(20)
-        .repetitions(3)
+        .steps(60)
+        .population(12)
+        .repetitions(2)
         .build()?;
     let (scenario, seeds) = (settings.scenario(), SeedTree::new(settings.seed()));
     let mut population = Population::random(settings.topology(), settings.population(), seeds);
-    for generation in 0..15 {
+    for generation in 0..10 {
         let trial = |repetition| scenario.trial(seeds, generation, repetition);
         let trials: Vec<Trial> = (0..settings.repetitions()).map(trial).collect();
         let fitness = evaluate(population.ask(), scenario, &trials, Moves::default)?;

@@ -29,14 +29,14 @@ impl SelectParent for Truncation {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = Settings::builder()
-        .steps(100)
-        .population(20)
-        .repetitions(3)
+        .steps(60)
+        .population(12)
+        .repetitions(2)
         .build()?;
     let (scenario, seeds) = (settings.scenario(), SeedTree::new(settings.seed()));
     let scored = settings.scored_bits() as f64;
     let mut population = Population::random(settings.topology(), settings.population(), seeds);
-    for generation in 0..15 {
+    for generation in 0..10 {
         let trial = |repetition| scenario.trial(seeds, generation, repetition);
         let trials: Vec<Trial> = (0..settings.repetitions()).map(trial).collect();
         let matches = evaluate(population.ask(), scenario, &trials, Matches::default)?;

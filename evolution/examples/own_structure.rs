@@ -38,10 +38,10 @@ impl Pattern for Block {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     for seed in 1..=3 {
         let settings = Settings::builder()
-            .population(10)
-            .generations(10)
+            .population(6)
+            .generations(6)
             .repetitions(2)
-            .steps(200)
+            .steps(120)
             .seed(seed)
             .build()?;
         let grid = settings.scenario().grid();

@@ -1,7 +1,7 @@
 //! `evolver export`: writes runs and genomes in the formats of other programs.
 
 use super::errors::unusable;
-use super::replay::write_file;
+use super::new_file::write_file;
 use super::{BadInput, flag, genome_file, read_genome};
 use crate::report::embedding::{self, c_header, intel_hex, probe_rs_line, rust_source, slot};
 use clap::{Args, ValueEnum};

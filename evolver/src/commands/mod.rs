@@ -13,6 +13,7 @@ pub mod hil;
 pub mod import;
 pub mod inspect;
 pub mod monitor;
+mod new_file;
 pub mod pictures;
 pub mod port;
 pub mod replay;

@@ -1,6 +1,6 @@
 //! `evolver replay` to files: stills and animations.
 
-use super::replay::{refuse_existing, write_file};
+use super::new_file::{refuse_existing, write_file};
 use super::{BadInput, flag};
 use clap::{ArgGroup, Args, ValueEnum};
 use minimal_surprise_evolution::files::Existing;

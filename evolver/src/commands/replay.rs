@@ -2,6 +2,7 @@
 
 use super::damage::corners;
 use super::errors::unusable;
+use super::new_file::{refuse_existing, write_file};
 use super::pictures::PictureArgs;
 use super::setting_flags::GenomeConditions;
 use super::{BadInput, flag, read_genome};
@@ -159,36 +160,6 @@ fn paints() -> Paints {
         Some(level) if level.has_basic => Paints::Sixteen,
         _ => Paints::None,
     }
-}
-
-/// Refuses a path that exists.
-pub(super) fn refuse_existing(flag: &str, path: &Path, overwrite: bool) -> Result<(), BadInput> {
-    if !overwrite && path.symlink_metadata().is_ok() {
-        return Err(exists(flag, path, ", or replace it with --overwrite"));
-    }
-    Ok(())
-}
-
-/// The error for a path that exists.
-fn exists(flag: &str, path: &Path, or_else: &str) -> BadInput {
-    BadInput::new(format!(
-        "--{flag} = {}: it exists; name another{or_else}",
-        path.display()
-    ))
-}
-
-/// Writes the file that a flag names.
-pub(super) fn write_file(
-    flag: &str,
-    path: &Path,
-    contents: &[u8],
-    existing: Existing,
-) -> anyhow::Result<()> {
-    files::write(path, contents, existing).map_err(|error| match error {
-        error if error.is_exists() => exists(flag, path, "").into(),
-        error if error.is_bad_path() => BadInput::new(format!("--{flag} = {error}")).into(),
-        error => error.into(),
-    })
 }
 
 fn recording(arguments: &ReplayArgs) -> anyhow::Result<Recording> {

@@ -1,6 +1,7 @@
 //! What people and other programs get to see: progress, files, and words at the end.
 
 pub mod embedding;
+pub mod picture;
 pub mod progress;
 pub mod reevaluation;
 pub mod structures;

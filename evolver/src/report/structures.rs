@@ -1,6 +1,6 @@
 //! What a swarm formed, as a picture and a table, or as JSON.
 
-use super::summary::picture;
+use super::picture::picture;
 use minimal_surprise_evolution::run_files::{MeasuresOfRun, SCHEMA_VERSION, names};
 use minimal_surprise_sim::metrics::Measures;
 use minimal_surprise_sim::structures::{LineCounts, Structure, Structures, in_words};

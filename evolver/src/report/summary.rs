@@ -2,7 +2,6 @@
 
 use super::structures::{self, Classified};
 use crate::output::stdout_is_ascii;
-use console::{Style, Term};
 use minimal_surprise_controller::codec::FORMAT_VERSION;
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{EncodedGenome, KERNEL_ID};
@@ -10,13 +9,8 @@ use minimal_surprise_evolution::experiment::{EvolutionResult, Experiment};
 use minimal_surprise_evolution::run_files::{BEST, CONFIG};
 use minimal_surprise_evolution::settings::{describe, model_name};
 use minimal_surprise_evolution::text::shell_path;
-use minimal_surprise_sim::drawing::draw_members;
-use minimal_surprise_sim::{Grid, Pose};
 use std::fmt::Write;
 use std::path::Path;
-
-/// Most rows and columns of the picture if the output is not a terminal.
-const WITHOUT_TERMINAL: (u16, u16) = (60, 120);
 
 /// The command that starts this program, for commands that people can copy.
 #[must_use]
@@ -26,31 +20,6 @@ pub fn program() -> &'static str {
     } else {
         "evolver"
     }
-}
-
-/// A picture of the swarm, two columns per cell: members as filled arrows (coloured on a terminal),
-/// the others hollow. In ASCII, where both look alike, members have a star. If it does not fit, a
-/// line that says so.
-#[must_use]
-pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> String {
-    let (rows, columns) = Term::stdout().size_checked().unwrap_or(WITHOUT_TERMINAL);
-    if 2 * u32::from(grid.width()) + 1 > u32::from(columns) || grid.height() > 4 * rows {
-        return format!("(a {grid} grid is too large to draw in this terminal)");
-    }
-    let member = Style::new().cyan().bold();
-    let star = if stdout_is_ascii() { '*' } else { ' ' };
-    let cell = |cell: char| {
-        if "▶▲◀▼".contains(cell) {
-            format!("{star}{}", member.apply_to(cell))
-        } else {
-            format!(" {cell}")
-        }
-    };
-    let lines: Vec<String> = draw_members(grid, poses, is_member)
-        .lines()
-        .map(|row| format!(" {}", row.chars().map(cell).collect::<String>()))
-        .collect();
-    lines.join("\n")
 }
 
 /// The result of an evolution, and what to do next.

@@ -1,6 +1,6 @@
 //! Errors in talking to a robot.
 
-use super::PortName;
+use super::port_name::PortName;
 use minimal_surprise_controller::{KERNEL_ID, KernelId};
 use minimal_surprise_link::Refusal;
 

@@ -1,12 +1,11 @@
 //! One serial port, and one request after another over it.
 
 use super::error::{Doing, Heard, OtherReader, Problem, RobotError};
-use minimal_surprise_evolution::text::terminal_path;
+use super::port_name::PortName;
 use minimal_surprise_link::{Client, MalformedMessage, Refusal, Reply, Request};
 use serialport::SerialPort;
-use std::fmt;
 use std::io::{self, ErrorKind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -18,16 +17,6 @@ const PAUSE: Duration = Duration::from_millis(1);
 
 /// For operations that must not be interrupted.
 static NEVER: AtomicBool = AtomicBool::new(false);
-
-/// A port, as the user names it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PortName(pub PathBuf);
-
-impl fmt::Display for PortName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&terminal_path(&self.0))
-    }
-}
 
 /// A port with a conversation.
 pub(super) struct Line {

@@ -7,10 +7,11 @@ mod error;
 mod held;
 mod line;
 mod plausible;
+mod port_name;
 
 pub use error::{Doing, Heard, OtherReader, Problem, RobotError};
 pub use held::{Afterwards, standing};
-pub use line::PortName;
+pub use port_name::PortName;
 
 use line::{Line, is_lost_session};
 use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Surprise};

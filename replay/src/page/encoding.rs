@@ -139,8 +139,7 @@ fn block(recording: &Recording, layout: Layout, first: usize) -> Vec<u8> {
         for part in 0..5 {
             bytes.extend(per_state(layout, first, steps, |t, robot| {
                 let pose = recording.poses(t)[robot];
-                let ([x0, x1], [y0, y1]) = (pose.x.to_le_bytes(), pose.y.to_le_bytes());
-                [x0, x1, y0, y1, pose.heading as u8][part]
+                pose.bytes()[part]
             }));
         }
     }

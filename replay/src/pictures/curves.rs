@@ -1,7 +1,8 @@
 //! A value over time, as in the paper's Figs. 5 and 6, with the axes laid out by plotters.
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, channels, line};
-use super::{PictureError, named, words};
+use super::style::{PictureError, named};
+use super::words;
 use crate::palette::Theme;
 use crate::recording::Recording;
 use plotters::prelude::{

@@ -1,6 +1,6 @@
 //! The parts of a picture: areas, lines and text on a background, written as SVG.
 
-use super::words;
+use super::words::{self, rounded};
 use crate::palette::Theme;
 use svg::node::element::path::Data;
 use svg::node::element::{Group, Path, Rectangle, Title};
@@ -219,12 +219,6 @@ pub(super) fn channels(colour: &str) -> [u8; 3] {
         let digits = colour.get(at..at + 2).unwrap_or("00");
         u8::from_str_radix(digits, 16).unwrap_or(0)
     })
-}
-
-/// Lengths have three decimals; more would only make the file longer.
-pub(super) fn rounded(length: f64) -> f32 {
-    // Turns negative zero into zero.
-    ((length * 1000.0).round() / 1000.0 + 0.0) as f32
 }
 
 /// A closed outline.

@@ -1,7 +1,8 @@
 //! Animations: one frame per state, as GIF, or as MP4 where ffmpeg is installed.
 
 use super::raster::Pixels;
-use super::{PictureError, Style, last_shown, state};
+use super::state;
+use super::style::{PictureError, Style, last_shown};
 use crate::recording::Recording;
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
 use rayon::prelude::*;

@@ -1,8 +1,9 @@
 //! What the colours and marks of a picture mean.
 
 use super::drawing::{Anchor, Drawing, Size};
+use super::style::Style;
 use super::symbols::{area_stroke, arrow, mark, square};
-use super::{Style, words};
+use super::words;
 use crate::recording::Recording;
 use crate::scene::{Colouring, Ink, Mark, Scene};
 use minimal_surprise_sim::damage::Damage;

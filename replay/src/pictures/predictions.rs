@@ -1,8 +1,9 @@
 //! What robots predict around them, averaged over the run, as in the paper's Fig. 9.
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, channels};
+use super::style::{PictureError, named};
 use super::symbols::{arrow, square};
-use super::{PictureError, named, words};
+use super::words;
 use crate::palette::Theme;
 use crate::recording::Recording;
 use crate::scene::Ink;

@@ -1,6 +1,7 @@
 //! Pictures as pixels.
 
-use super::{Drawing, PictureError};
+use super::drawing::Drawing;
+use super::style::PictureError;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 

@@ -2,8 +2,9 @@
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, line};
 use super::legend::Legend;
+use super::style::{PictureError, Style, named};
 use super::symbols::{area_stroke, arrow, set_off, square};
-use super::{PictureError, Style, named, symbols, words};
+use super::{symbols, words};
 use crate::recording::Recording;
 use crate::scene::{Colouring, Ink, Scene};
 use minimal_surprise_sim::damage::Damage;

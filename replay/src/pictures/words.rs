@@ -1,7 +1,6 @@
 //! Text as outlines, in the bundled font: a picture looks the same everywhere, whatever fonts are
 //! installed.
 
-use super::drawing::rounded;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 use svg::node::element::path::{Command, Data};
@@ -86,6 +85,12 @@ pub(super) fn outlines(words: &str, size: f64, (mut x, y): (f64, f64)) -> Data {
         x += letter.advance * scale;
     }
     data
+}
+
+/// Lengths have three decimals; more would only make the file longer.
+pub(super) fn rounded(length: f64) -> f32 {
+    // Turns negative zero into zero.
+    ((length * 1000.0).round() / 1000.0 + 0.0) as f32
 }
 
 #[cfg(test)]
