@@ -1,6 +1,6 @@
 //! One seed gives one result, independent of threads, builds and interruptions.
 
-use minimal_surprise_sim::Path;
+use minimal_surprise_sim::EnginePath;
 use minimal_surprise_sim::engine::PATH_VARIABLE;
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
@@ -97,7 +97,7 @@ fn engines_and_their_paths_change_nothing() {
         let evolver = Evolver::in_empty_folder();
         assert_eq!(hash(&evolver, arguments, &["--engine", "plain"]), expected);
         let of_plain_world = contents(&evolver);
-        for path in Path::available() {
+        for path in EnginePath::available() {
             let evolver = Evolver::in_empty_folder();
             let arguments = [arguments, &["--out", "run"]].concat();
             let run = evolver.run_with((PATH_VARIABLE, path.name()), &arguments);

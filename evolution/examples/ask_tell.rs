@@ -5,7 +5,7 @@
 use cmaes::{CMAESOptions, DVector, Mode};
 use minimal_surprise_controller::{Genome, Topology};
 use minimal_surprise_evolution::settings::Settings;
-use minimal_surprise_sim::{Engine, Evaluator, Path, SeedTree, Trial, TrialSet};
+use minimal_surprise_sim::{Engine, EnginePath, Evaluator, SeedTree, Trial, TrialSet};
 
 /// Q3.12 of a real number, within the range of weights.
 fn weight_q3_12(weight: f64) -> i16 {
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let trials = TrialSet::new(*scenario, topology.model(), trials);
     let scored = settings.scored_bits() as f64;
     let fitness = |weights: &DVector<f64>| {
-        let mut evaluator = Evaluator::new(Engine::Fast, Path::best());
+        let mut evaluator = Evaluator::new(Engine::Fast, EnginePath::best());
         evaluator
             .evaluate(&genome(topology, weights), &trials)
             .matches as f64

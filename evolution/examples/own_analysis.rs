@@ -9,7 +9,7 @@ use minimal_surprise_evolution::finished_run::FinishedRun;
 use minimal_surprise_evolution::run_dir::RunDir;
 use minimal_surprise_evolution::run_files::Program;
 use minimal_surprise_evolution::settings::Settings;
-use minimal_surprise_sim::{Engine, Heading, Path as EnginePath};
+use minimal_surprise_sim::{Engine, EnginePath, Heading};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;

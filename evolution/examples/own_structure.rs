@@ -6,7 +6,7 @@ use minimal_surprise_evolution::experiment::Experiment;
 use minimal_surprise_evolution::settings::Settings;
 use minimal_surprise_sim::structures::{Pattern, Structure};
 use minimal_surprise_sim::world::check_poses;
-use minimal_surprise_sim::{Engine, Grid, Path, Pose, WorldError};
+use minimal_surprise_sim::{Engine, EnginePath, Grid, Pose, WorldError};
 use std::collections::HashSet;
 use std::sync::atomic::AtomicBool;
 
@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let grid = settings.scenario().grid();
         let mut experiment = Experiment::new(settings);
         while !experiment.is_finished() {
-            let _ = experiment.advance(Engine::Fast, Path::best(), &AtomicBool::new(false));
+            let _ = experiment.advance(Engine::Fast, EnginePath::best(), &AtomicBool::new(false));
         }
         let finding = experiment.finding()?.ok_or("no generation was evaluated")?;
         let poses = &finding.outcome.final_poses;

@@ -161,7 +161,7 @@ fn genome(topology: Topology, weights: &[i16]) -> Result<Genome, CheckpointError
 mod tests {
     use super::*;
     use crate::settings::Overrides;
-    use minimal_surprise_sim::{Engine, Path};
+    use minimal_surprise_sim::{Engine, EnginePath};
     use std::sync::atomic::AtomicBool;
 
     fn settings() -> Settings {
@@ -183,7 +183,8 @@ mod tests {
     fn decoded(change: impl FnOnce(&mut Stored)) -> Result<Experiment, CheckpointError> {
         let mut experiment = Experiment::new(settings());
         for _ in 0..2 {
-            let _ = experiment.advance(Engine::Plain, Path::Portable, &AtomicBool::new(false));
+            let _ =
+                experiment.advance(Engine::Plain, EnginePath::Portable, &AtomicBool::new(false));
         }
         let bytes = encode(&experiment, "text");
         let mut stored = postcard::from_bytes(&bytes).unwrap();

@@ -3,7 +3,7 @@
 use crate::experiment::{Experiment, GenerationRecord};
 use crate::files::FileError;
 use crate::run_dir::RunDir;
-use minimal_surprise_sim::{Engine, Path};
+use minimal_surprise_sim::{Engine, EnginePath};
 use std::sync::atomic::AtomicBool;
 use std::thread::{self, ScopedJoinHandle};
 
@@ -15,7 +15,7 @@ use std::thread::{self, ScopedJoinHandle};
 pub fn until_finished(
     experiment: &mut Experiment,
     run: &RunDir,
-    (engine, path): (Engine, Path),
+    (engine, path): (Engine, EnginePath),
     stop: &AtomicBool,
     mut each_generation: impl FnMut(&GenerationRecord),
 ) -> Result<bool, FileError> {

@@ -10,7 +10,7 @@ use minimal_surprise_controller::{Controller, Genome, Provenance};
 use minimal_surprise_sim::evaluation::{Outcome, run};
 use minimal_surprise_sim::metrics::Measures;
 use minimal_surprise_sim::structures::{Structures, classify};
-use minimal_surprise_sim::{Engine, Evaluator, Path, Pose, SeedTree, Trial, WorldError};
+use minimal_surprise_sim::{Engine, EnginePath, Evaluator, Pose, SeedTree, Trial, WorldError};
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
 
@@ -137,7 +137,7 @@ impl Experiment {
     pub fn advance(
         &mut self,
         engine: Engine,
-        path: Path,
+        path: EnginePath,
         stop: &AtomicBool,
     ) -> Option<GenerationRecord> {
         let seeds = SeedTree::new(self.settings.seed());

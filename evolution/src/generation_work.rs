@@ -5,7 +5,7 @@
 //! their repetitions. Which thread does what enters no result.
 
 use minimal_surprise_controller::{Genome, Topology};
-use minimal_surprise_sim::{Engine, Evaluation, Evaluator, Path, Scenario, Trial, TrialSet};
+use minimal_surprise_sim::{Engine, EnginePath, Evaluation, Evaluator, Scenario, Trial, TrialSet};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Genomes whose repetitions are dealt in halves.
@@ -80,7 +80,7 @@ impl<'a> GenerationWork<'a> {
     pub fn evaluate(
         &self,
         engine: Engine,
-        path: Path,
+        path: EnginePath,
         stop: &AtomicBool,
     ) -> Option<Vec<Evaluation>> {
         let next = AtomicUsize::new(0);
@@ -159,10 +159,10 @@ mod tests {
                 .collect();
             let work = GenerationWork::new(&scenario, topology, trials, &genomes);
             let go_on = AtomicBool::new(false);
-            let evaluations = work.evaluate(Engine::Fast, Path::best(), &go_on);
+            let evaluations = work.evaluate(Engine::Fast, EnginePath::best(), &go_on);
             assert_eq!(evaluations, Some(expected));
             let stop = AtomicBool::new(true);
-            assert_eq!(work.evaluate(Engine::Fast, Path::best(), &stop), None);
+            assert_eq!(work.evaluate(Engine::Fast, EnginePath::best(), &stop), None);
         }
     }
 }

@@ -6,7 +6,7 @@ use minimal_surprise_controller::Provenance;
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
 use minimal_surprise_evolution::experiment::Experiment;
 use minimal_surprise_evolution::settings::{Overrides, Settings};
-use minimal_surprise_sim::{Engine, Path};
+use minimal_surprise_sim::{Engine, EnginePath};
 
 const GENERATIONS: [usize; 3] = [10, 50, 90];
 const GENOMES: usize = 20;

@@ -18,7 +18,7 @@ const START: &[u8] = b"minimal surprise hil, version 1";
 
 /// Everything that a run depends on.
 #[derive(Clone, Debug)]
-pub struct Course {
+pub struct HilTrial {
     /// The robots' controller.
     pub controller: Controller,
     /// Grid, swarm size, steps, noise.
@@ -29,7 +29,7 @@ pub struct Course {
 
 /// The result of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Ran {
+pub struct HilRun {
     /// The hash of the run.
     pub hash: HilHash,
     /// Robot 0's decision in every step.
@@ -59,12 +59,12 @@ pub enum HilError<E> {
     Robot(E),
 }
 
-impl Course {
+impl HilTrial {
     /// Runs the swarm with all robots simulated.
     ///
     /// # Errors
     /// [`WorldError`] if the starting poses do not fit the grid.
-    pub fn simulate(&self) -> Result<Ran, WorldError> {
+    pub fn simulate(&self) -> Result<HilRun, WorldError> {
         let mut world = self.world()?;
         let mut noise = self.trial.noise.clone();
         let mut record = Record::of(&world);
@@ -83,7 +83,7 @@ impl Course {
     pub fn with_robot<E>(
         &self,
         mut step: impl FnMut(SensorBits) -> Result<Stepped, E>,
-    ) -> Result<Ran, HilError<E>> {
+    ) -> Result<HilRun, HilError<E>> {
         let mut world = self.world().map_err(HilError::World)?;
         let mut noise = self.trial.noise.clone();
         let mut record = Record::of(&world);
@@ -122,7 +122,7 @@ impl Course {
     }
 }
 
-impl Ran {
+impl HilRun {
     /// The first step, counted from 1, in which robot 0's decisions differ.
     #[must_use]
     pub fn first_difference(&self, there: &Self) -> Option<usize> {
@@ -164,10 +164,10 @@ impl Record {
         self.decisions.extend(world.decisions().first());
     }
 
-    fn end(mut self, surprise: Surprise) -> Ran {
+    fn end(mut self, surprise: Surprise) -> HilRun {
         self.hash.update(surprise.mispredicted_bits.to_le_bytes());
         self.hash.update(surprise.seen_bits.to_le_bytes());
-        Ran {
+        HilRun {
             hash: HilHash(self.hash.finalize().into()),
             decisions: self.decisions,
             surprise,

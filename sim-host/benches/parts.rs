@@ -6,7 +6,7 @@ use divan::counter::ItemsCount;
 use minimal_surprise_controller::{Controller, EncodedGenome, Genome, SensorModel};
 use minimal_surprise_sim::structures::classify;
 use minimal_surprise_sim::{
-    Engine, Evaluator, Grid, NoiseRate, Path, Scenario, SeedTree, TrialSet, World,
+    Engine, EnginePath, Evaluator, Grid, NoiseRate, Scenario, SeedTree, TrialSet, World,
 };
 use std::hint::black_box;
 
@@ -46,7 +46,7 @@ fn plain_worlds_step_of_100_robots(bencher: Bencher) {
 }
 
 /// The fast engine's world alone: sensing, actions by table, moving.
-#[divan::bench(args = Path::available().into_iter().map(Path::name))]
+#[divan::bench(args = EnginePath::available().into_iter().map(EnginePath::name))]
 fn fast_world_of_500_steps(bencher: Bencher, path: &str) {
     let trials = trials(0.0, 1);
     let genome = genome();
@@ -56,17 +56,17 @@ fn fast_world_of_500_steps(bencher: Bencher, path: &str) {
         .bench_local(|| evaluator.motion(&genome, &trials, 0));
 }
 
-#[divan::bench(args = Path::available().into_iter().map(Path::name))]
+#[divan::bench(args = EnginePath::available().into_iter().map(EnginePath::name))]
 fn evaluation(bencher: Bencher, path: &str) {
     evaluation_of(bencher, evaluator(path), 0.0);
 }
 
-#[divan::bench(args = Path::available().into_iter().map(Path::name))]
+#[divan::bench(args = EnginePath::available().into_iter().map(EnginePath::name))]
 fn evaluation_without_the_shortcut(bencher: Bencher, path: &str) {
     evaluation_of(bencher, evaluator(path).with_repeats_skipped(false), 0.0);
 }
 
-#[divan::bench(args = Path::available().into_iter().map(Path::name))]
+#[divan::bench(args = EnginePath::available().into_iter().map(EnginePath::name))]
 fn evaluation_with_noise(bencher: Bencher, path: &str) {
     evaluation_of(bencher, evaluator(path), 0.1);
 }
@@ -80,7 +80,7 @@ fn structures_of_100_robots(bencher: Bencher) {
 }
 
 fn evaluator(path: &str) -> Evaluator {
-    let path = Path::named(path).expect("one of those available");
+    let path = EnginePath::named(path).expect("one of those available");
     Evaluator::new(Engine::Fast, path)
 }
 

@@ -16,7 +16,7 @@ pub mod trace;
 pub mod world;
 
 pub use damage::{Area, Damage, DamageError};
-pub use engine::{Engine, Evaluator, Path, TrialSet};
+pub use engine::{Engine, EnginePath, Evaluator, TrialSet};
 pub use evaluation::{Evaluation, Outcome, evaluate, run};
 pub use metrics::{Match, Measures, Motion, similarity};
 pub use noise::{NoiseRate, NoiseStream};

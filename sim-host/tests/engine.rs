@@ -3,8 +3,8 @@
 use minimal_surprise_controller::{Controller, Genome, MutationRate, Topology};
 use minimal_surprise_sim::seed::Stream;
 use minimal_surprise_sim::{
-    Engine, Evaluator, Grid, Measures, NoiseRate, Path, Purpose, Scenario, SeedTree, TrialSet,
-    evaluate, run,
+    Engine, EnginePath, Evaluator, Grid, Measures, NoiseRate, Purpose, Scenario, SeedTree,
+    TrialSet, evaluate, run,
 };
 use rand_core::Rng as _;
 
@@ -55,7 +55,7 @@ impl Case {
             measures.observe(world);
         })
         .unwrap();
-        for path in Path::available() {
+        for path in EnginePath::available() {
             let (motion, final_poses) =
                 Evaluator::new(Engine::Fast, path).motion(&genome, &trials, 0);
             assert_eq!(
@@ -165,7 +165,7 @@ fn the_plain_engine_is_the_plain_evaluation() {
     let topology = Topology::default();
     let trials = TrialSet::new(scenario, topology.model(), trials);
     let genome = Genome::zeroed(topology);
-    let mut plain = Evaluator::new(Engine::Plain, Path::best());
+    let mut plain = Evaluator::new(Engine::Plain, EnginePath::best());
     assert_eq!(
         plain.evaluate(&genome, &trials),
         evaluate(&genome, &scenario, trials.trials())

@@ -10,7 +10,7 @@ pub mod populations;
 use minimal_surprise_controller::{Controller, Genome, SensorModel, Topology};
 use minimal_surprise_evolution::usage::{self, Stopwatch};
 use minimal_surprise_sim::{
-    Engine, Evaluator, Grid, NoiseRate, Path, Scenario, SeedTree, Trial, TrialSet, World,
+    Engine, EnginePath, Evaluator, Grid, NoiseRate, Scenario, SeedTree, Trial, TrialSet, World,
 };
 use serde::Serialize;
 use std::io;
@@ -51,7 +51,7 @@ const SECONDS_MIN: f64 = 1.5;
 ///
 /// # Errors
 /// If this program cannot be started as a child to measure whole evolutions.
-pub fn run(path: Path, mut say: impl FnMut(&str)) -> io::Result<Report> {
+pub fn run(path: EnginePath, mut say: impl FnMut(&str)) -> io::Result<Report> {
     let on_15 = populations::c_15x15();
     let on_20 = populations::c_20x20();
     let noisy = populations::c_15x15_noise();

@@ -2,14 +2,14 @@
 
 use super::BadInput;
 use crate::bench::{self, Report};
-use minimal_surprise_sim::Path;
+use minimal_surprise_sim::EnginePath;
 
 /// Measures and prints the results.
 ///
 /// # Errors
 /// [`BadInput`] if the environment names a vector path that this processor does not support.
 pub fn bench(json: bool) -> anyhow::Result<()> {
-    let path = Path::from_environment().map_err(BadInput::new)?;
+    let path = EnginePath::from_environment().map_err(BadInput::new)?;
     let report = bench::run(path, |what| {
         if !json {
             tell!("measuring: {what}");
@@ -23,7 +23,7 @@ pub fn bench(json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn text(report: &Report, path: Path) -> String {
+fn text(report: &Report, path: EnginePath) -> String {
     let millions = |speed: f64| format!("{:.1}", speed / 1e6);
     let memory = report
         .peak_rss_mb

@@ -4,7 +4,6 @@ use super::errors::unusable;
 use super::{BadInput, flag, genome_file, read_genome, thread_pool, threads_flag};
 use crate::report::reevaluation::{Condition, conditions_json, conditions_text};
 use clap::Args;
-use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_evolution::files;
 use minimal_surprise_evolution::finished_run::settings_of_run;
 use minimal_surprise_evolution::limits::{self, Needs};
@@ -58,7 +57,7 @@ pub struct EvaluateArgs {
 /// [`BadInput`] names the flag, the value and what would be valid.
 pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     let file = genome_file(&arguments.genome);
-    let bytes = read_genome(&arguments.genome)?;
+    let genome = read_genome(&arguments.genome)?;
     let run = conditions_beside(&file)?;
     let value = |name: &str, given: &Option<String>| {
         let of_run = || run.as_ref()?.value(name).map(|value| value.to_string());
@@ -73,7 +72,6 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     let noise = value("noise", &arguments.noise);
     let robots = value("robots", &arguments.robots);
     let steps = value("steps", &arguments.steps);
-    let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
     let starts = flag("starts", &arguments.starts, |text| count(text, 1_000_000))?;
     let steps = flag("steps", &steps, |text| count(text, u32::MAX))?;
     let grids = list("grid", &grid, settings::grid)?;
@@ -82,7 +80,7 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     let threads = threads_flag(&arguments.threads)?;
     let seed = match &arguments.seed {
         Some(text) => flag("seed", text, settings::seed)?,
-        None => encoded.provenance().seed.unwrap_or(0),
+        None => genome.provenance().seed.unwrap_or(0),
     };
     let mut scenarios = Vec::new();
     for &grid in &grids {
@@ -99,14 +97,13 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     Needs::of_starts(&scenarios, ("starts", starts), limits::threads(threads))
         .check_memory()
         .map_err(BadInput::new)?;
-    let genome = encoded.to_genome();
     let seeds = SeedTree::new(seed);
     let conditions = thread_pool(threads)?.install(|| {
         scenarios
             .into_iter()
             .map(|(scenario, noise)| {
                 Ok(Condition {
-                    reruns: rerun(&genome, &scenario, seeds, starts)?,
+                    reruns: rerun(genome.genome(), &scenario, seeds, starts)?,
                     scenario,
                     noise,
                 })

@@ -23,7 +23,7 @@ use minimal_surprise_evolution::settings::{
 use minimal_surprise_evolution::text::{shell_path, terminal_path, text_of_path};
 use minimal_surprise_replay::recording::Recording;
 use minimal_surprise_replay::scene::Colouring;
-use minimal_surprise_sim::{Engine, Path as CodePath};
+use minimal_surprise_sim::{Engine, EnginePath};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -72,10 +72,10 @@ pub enum EngineName {
 
 /// How to run, whatever is run; no result depends on it.
 #[derive(Clone, Copy, Debug)]
-struct Manner {
+struct RunOptions {
     progress: ProgressMode,
     engine: Engine,
-    path: CodePath,
+    path: EnginePath,
 }
 
 /// Evolves a swarm.
@@ -88,13 +88,13 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
     if arguments.open {
         check_terminal().map_err(|error| BadInput::new(format!("--open: {error}")))?;
     }
-    let manner = Manner {
+    let options = RunOptions {
         progress: arguments.progress,
         engine: match arguments.engine {
             EngineName::Plain => Engine::Plain,
             EngineName::Fast => Engine::Fast,
         },
-        path: CodePath::from_environment().map_err(BadInput::new)?,
+        path: EnginePath::from_environment().map_err(BadInput::new)?,
     };
     let stop = stop_on_signal()?;
     let (experiment, run) = match &arguments.resume {
@@ -157,7 +157,8 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
             (experiment, run)
         }
     };
-    let finished = thread_pool(threads)?.install(|| generations(experiment, &run, manner, stop))?;
+    let finished =
+        thread_pool(threads)?.install(|| generations(experiment, &run, options, stop))?;
     if !finished {
         let program = summary::program();
         let directory = shell_path(run.path());
@@ -187,12 +188,12 @@ fn watch(directory: &Path, stop: &AtomicBool) -> anyhow::Result<Exit> {
 fn generations(
     mut experiment: Experiment,
     run: &RunDir,
-    manner: Manner,
+    options: RunOptions,
     stop: &AtomicBool,
 ) -> anyhow::Result<bool> {
     let done = experiment.history().len() as u32;
-    let progress = Progress::start(manner.progress, experiment.settings(), done);
-    let how = (manner.engine, manner.path);
+    let progress = Progress::start(options.progress, experiment.settings(), done);
+    let how = (options.engine, options.path);
     let finished = until_finished(&mut experiment, run, how, stop, |record| {
         progress.generation(record);
     })?;
@@ -204,7 +205,7 @@ fn generations(
         .finding()?
         .ok_or_else(|| anyhow::anyhow!("an evolution has at least one generation"))?;
     run.finish(&experiment, &finding)?;
-    if manner.progress == ProgressMode::Json {
+    if options.progress == ProgressMode::Json {
         let mut done = serde_json::json!({
             "event": "done",
             "fitness": finding.outcome.fitness(),

@@ -5,7 +5,6 @@ use super::new_file::write_file;
 use super::{BadInput, flag, genome_file, read_genome};
 use crate::report::embedding::{self, c_header, intel_hex, probe_rs_line, rust_source, slot};
 use clap::{Args, ValueEnum};
-use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_evolution::files::Existing;
 use minimal_surprise_evolution::finished_run::FinishedRun;
 use minimal_surprise_evolution::limits::Needs;
@@ -145,19 +144,19 @@ fn genome(
     address: u32,
     write_count: u32,
 ) -> anyhow::Result<Vec<u8>> {
-    let container = read_genome(&arguments.from)?;
-    let encoded = EncodedGenome::decode(&container)?;
+    let genome = read_genome(&arguments.from)?;
+    let container = genome.bytes();
     Ok(match format {
-        Format::C => c_header(&encoded, &container, &symbol(arguments, &container)?).into_bytes(),
+        Format::C => c_header(&genome, &symbol(arguments, container)?).into_bytes(),
         Format::Rust => {
-            let mut symbol = symbol(arguments, &container)?;
+            let mut symbol = symbol(arguments, container)?;
             if arguments.name.is_none() {
                 symbol.make_ascii_uppercase();
             }
-            rust_source(&encoded, &container, &symbol).into_bytes()
+            rust_source(&genome, &symbol).into_bytes()
         }
         Format::Hex => {
-            let text = intel_hex(&container, address).ok_or_else(|| {
+            let text = intel_hex(container, address).ok_or_else(|| {
                 BadInput::new(format!(
                     "--address = {}: the genome's {} bytes would extend beyond 0xffffffff",
                     arguments.address,
@@ -166,8 +165,8 @@ fn genome(
             })?;
             text.into_bytes()
         }
-        Format::Slot => slot(&container, write_count),
-        Format::Bin | Format::Trajectory => container,
+        Format::Slot => slot(container, write_count),
+        Format::Bin | Format::Trajectory => container.to_vec(),
     })
 }
 

@@ -24,7 +24,8 @@ pub struct FlashArgs {
 /// If the genome cannot be used, there is no such robot, or the robot fails. The robot switches
 /// genomes only once the new one is complete.
 pub fn flash(arguments: &FlashArgs) -> anyhow::Result<()> {
-    let container = read_genome(&arguments.genome)?;
+    let genome = read_genome(&arguments.genome)?;
+    let container = genome.bytes();
     let port = &arguments.port;
     let mut robot = port.connect()?;
     robot.check_kernel().map_err(failed)?;
@@ -33,7 +34,7 @@ pub fn flash(arguments: &FlashArgs) -> anyhow::Result<()> {
         "{pos}/{len} bytes",
     );
     let written = robot.while_stopped(Afterwards::Runs, &port.command("start"), |robot| {
-        robot.write(&container, |bytes| bar.set_position(bytes as u64))
+        robot.write(container, |bytes| bar.set_position(bytes as u64))
     });
     bar.finish_and_clear();
     written.map_err(failed)?;

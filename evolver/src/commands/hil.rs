@@ -5,12 +5,12 @@ use super::port::{PortArgs, failed};
 use super::setting_flags::GenomeConditions;
 use super::{BadInput, read_genome};
 use crate::exit::Exit;
-use crate::hil::{Course, HilError, Ran};
+use crate::hil::{HilError, HilRun, HilTrial};
 use crate::report::progress;
 use crate::robot::{Afterwards, Robot, RobotError, describe, is_in_use};
 use clap::Args;
 use indicatif::ProgressBar;
-use minimal_surprise_controller::{Controller, EncodedGenome};
+use minimal_surprise_controller::Controller;
 use minimal_surprise_evolution::finished_run::FinishedRun;
 use minimal_surprise_evolution::limits::Needs;
 use minimal_surprise_evolution::run_files::BEST;
@@ -53,8 +53,8 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
     };
     let mut robot = port.connect()?;
     robot.check_kernel().map_err(failed)?;
-    let container = read_genome(&genome)?;
-    if !is_in_use(robot.identity().genome, &container) {
+    let file = read_genome(&genome)?;
+    if !is_in_use(robot.identity().genome, file.bytes()) {
         return Err(BadInput::new(format!(
             "--port = {}: the robot runs {}, not {}; write that genome to it with: {}",
             port.name(),
@@ -86,13 +86,13 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
 }
 
 /// The run recorded in a directory, and its genome file.
-fn of_run(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
+fn of_run(arguments: &HilArgs) -> anyhow::Result<(HilTrial, PathBuf)> {
     let directory = &arguments.run;
     arguments
         .conditions
         .refuse_beside("a run directory", directory)?;
     let finished = FinishedRun::read_and_check(directory).map_err(unusable)?;
-    let course = Course {
+    let course = HilTrial {
         controller: Controller::new(&finished.genome),
         scenario: *finished.settings.scenario(),
         trial: finished.trial(),
@@ -101,12 +101,11 @@ fn of_run(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
 }
 
 /// The run that the flags define: the first trial of their seed.
-fn of_genome(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
-    let bytes = read_genome(&arguments.run)?;
-    let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
-    let settings = arguments.conditions.settings(&encoded)?;
-    let course = Course {
-        controller: Controller::from_encoded(&encoded),
+fn of_genome(arguments: &HilArgs) -> anyhow::Result<(HilTrial, PathBuf)> {
+    let genome = read_genome(&arguments.run)?;
+    let settings = arguments.conditions.settings(&genome)?;
+    let course = HilTrial {
+        controller: Controller::new(genome.genome()),
         scenario: *settings.scenario(),
         trial: settings
             .scenario()
@@ -116,7 +115,7 @@ fn of_genome(arguments: &HilArgs) -> anyhow::Result<(Course, PathBuf)> {
 }
 
 /// The run with the robot, after a reset of its controller.
-fn run(course: &Course, robot: &mut Robot) -> Result<Ran, HilError<RobotError>> {
+fn run(course: &HilTrial, robot: &mut Robot) -> Result<HilRun, HilError<RobotError>> {
     robot.reset().map_err(HilError::Robot)?;
     let bar = ProgressBar::new(course.scenario.steps().into());
     let bar = progress::bar(bar, "{pos}/{len} steps  {per_sec}");
@@ -129,7 +128,7 @@ fn run(course: &Course, robot: &mut Robot) -> Result<Ran, HilError<RobotError>> 
 }
 
 /// The first difference between robot and simulation.
-fn difference(ran: &Ran, simulated: &Ran) -> String {
+fn difference(ran: &HilRun, simulated: &HilRun) -> String {
     match ran.first_difference(simulated) {
         Some(step) => {
             let (robot, here) = (ran.decisions[step - 1], simulated.decisions[step - 1]);

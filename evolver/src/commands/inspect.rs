@@ -2,7 +2,6 @@
 
 use super::read_genome;
 use crate::report::summary;
-use minimal_surprise_controller::EncodedGenome;
 use std::path::Path;
 
 /// Shows a genome file, or the genome of a run directory.
@@ -10,8 +9,6 @@ use std::path::Path;
 /// # Errors
 /// [`BadInput`](super::BadInput) if the file cannot be read or its genome cannot be used.
 pub fn inspect(path: &Path) -> anyhow::Result<()> {
-    let bytes = read_genome(path)?;
-    let encoded = EncodedGenome::decode(&bytes)?;
-    show!("{}", summary::genome(&encoded, bytes.len()));
+    show!("{}", summary::genome(&read_genome(path)?));
     Ok(())
 }

@@ -24,10 +24,8 @@ pub mod suite;
 pub use errors::{BadInput, Interrupted, exit_of};
 
 use errors::unusable;
-use minimal_surprise_controller::EncodedGenome;
-use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
-use minimal_surprise_evolution::files;
 use minimal_surprise_evolution::finished_run::require;
+use minimal_surprise_evolution::genome_file::{GenomeFile, GenomeFileError};
 use minimal_surprise_evolution::run_files::{BEST, DONE};
 use minimal_surprise_evolution::settings::{THREADS_MAX, count};
 use std::path::{Path, PathBuf};
@@ -67,22 +65,18 @@ fn genome_file(path: &Path) -> PathBuf {
     }
 }
 
-/// The bytes of a genome file, or of a run directory's, after a look whether they are a genome for
-/// this program.
-fn read_genome(path: &Path) -> anyhow::Result<Vec<u8>> {
-    let file = &genome_file(path);
+/// A genome file, or that of a run directory.
+fn read_genome(path: &Path) -> anyhow::Result<GenomeFile> {
     if path.is_dir() {
         // Without its mark the run is not complete; marked, it is damaged.
         require(path, BEST)
             .or_else(|error| require(path, DONE).and(Err(error)))
             .map_err(unusable)?;
     }
-    let bytes = files::read(file, CONTAINER_BYTES_MAX as u64).map_err(unusable)?;
-    if let Err(error) = EncodedGenome::decode(&bytes) {
-        let message = format!("{}: {error}", file.display());
+    GenomeFile::read(&genome_file(path)).map_err(|error| match error {
+        GenomeFileError::File(error) => unusable(error),
         // Of a run directory it is the run that is damaged.
-        anyhow::ensure!(!path.is_dir(), message);
-        return Err(BadInput::new(message).into());
-    }
-    Ok(bytes)
+        error if path.is_dir() => error.into(),
+        error => BadInput::new(error).into(),
+    })
 }

@@ -12,7 +12,6 @@ use crate::report::progress::computing;
 use crate::signals::{ask_to_stop, on_signal, stop};
 use anyhow::Context;
 use clap::Args;
-use minimal_surprise_controller::EncodedGenome;
 use minimal_surprise_evolution::files::{self, DATA_BYTES_MAX, Existing};
 use minimal_surprise_evolution::finished_run::FinishedRun;
 use minimal_surprise_evolution::limits::Needs;
@@ -244,9 +243,8 @@ fn check_size(arguments: &ReplayArgs, scenario: &Scenario) -> Result<(), BadInpu
 /// The run that the flags define: the first trial of their seed.
 fn of_genome(arguments: &ReplayArgs, path: &Path, name: &str) -> anyhow::Result<Recording> {
     let conditions = &arguments.conditions;
-    let bytes = read_genome(path)?;
-    let encoded = EncodedGenome::decode(&bytes).map_err(BadInput::new)?;
-    let settings = conditions.settings(&encoded)?;
+    let file = read_genome(path)?;
+    let settings = conditions.settings(&file)?;
     let seeds = SeedTree::new(settings.seed());
     let origin = Origin {
         name: name.to_owned(),
@@ -257,9 +255,8 @@ fn of_genome(arguments: &ReplayArgs, path: &Path, name: &str) -> anyhow::Result<
     let scenario = settings.scenario();
     check_size(arguments, scenario)?;
     let trial = scenario.trial(seeds, 0, 0);
-    let genome = encoded.to_genome();
     let recording = computing(scenario, |after_step| {
-        Recording::of_trial(&genome, scenario, &trial, origin, after_step)
+        Recording::of_trial(file.genome(), scenario, &trial, origin, after_step)
     });
     Ok(recording.map_err(BadInput::new)?)
 }

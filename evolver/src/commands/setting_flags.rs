@@ -4,7 +4,8 @@
 use super::BadInput;
 use clap::builder::{OsStringValueParser, ValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
-use minimal_surprise_controller::{EncodedGenome, Prediction};
+use minimal_surprise_controller::Prediction;
+use minimal_surprise_evolution::genome_file::GenomeFile;
 use minimal_surprise_evolution::settings::{Overrides, SETTINGS, Setting, Settings, model_name};
 use minimal_surprise_evolution::text::text_of_path;
 use std::ffi::OsString;
@@ -143,8 +144,8 @@ impl GenomeConditions {
     ///
     /// # Errors
     /// [`BadInput`] names the flag, the value and the valid values.
-    pub(super) fn settings(&self, encoded: &EncodedGenome<'_>) -> Result<Settings, BadInput> {
-        let topology = encoded.topology();
+    pub(super) fn settings(&self, genome: &GenomeFile) -> Result<Settings, BadInput> {
+        let topology = genome.topology();
         let mut overrides = self.0.clone();
         overrides.flag("sensor-model", Some(model_name(topology.model())));
         match topology.prediction() {
@@ -154,7 +155,7 @@ impl GenomeConditions {
             }
             Prediction::Predefined(template) => overrides.flag("predefine", Some(template.name())),
         }
-        let seed = encoded.provenance().seed.unwrap_or(0);
+        let seed = genome.provenance().seed.unwrap_or(0);
         Settings::resolve(&overrides, || seed).map_err(BadInput::new)
     }
 }

@@ -23,7 +23,7 @@ use minimal_surprise_evolution::new_dir::remove_abandoned;
 use minimal_surprise_evolution::settings::count;
 use minimal_surprise_evolution::text::{file_name_except, shell_path, shell_word, terminal_path};
 use minimal_surprise_replay::gallery;
-use minimal_surprise_sim::Path as CodePath;
+use minimal_surprise_sim::EnginePath;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -587,7 +587,7 @@ fn run(work: &Work) -> anyhow::Result<Exit> {
     };
     let threads = threads_flag(&options.threads)?;
     // What `evolve` refuses, too, before anything is done.
-    CodePath::from_environment().map_err(BadInput::new)?;
+    EnginePath::from_environment().map_err(BadInput::new)?;
     let runs = shard.of_plan(plan);
     let mut damaged = DamagedRuns::default();
     let threads_or_cores = limits::threads(threads);

@@ -2,7 +2,7 @@
 
 use crate::robot::length_and_crc;
 use ihex::{Record, create_object_file_representation};
-use minimal_surprise_controller::EncodedGenome;
+use minimal_surprise_evolution::genome_file::GenomeFile;
 use minimal_surprise_evolution::settings::describe;
 use minimal_surprise_evolution::text::{identifier, shell_path, shell_word};
 use minimal_surprise_slots::Header;
@@ -21,7 +21,8 @@ pub fn symbol(name: &str, container: &[u8]) -> String {
 
 /// A C header with the container as an array with this name.
 #[must_use]
-pub fn c_header(genome: &EncodedGenome<'_>, container: &[u8], symbol: &str) -> String {
+pub fn c_header(genome: &GenomeFile, symbol: &str) -> String {
+    let container = genome.bytes();
     // Unchanged: names that differ only in case are different.
     let guard = format!("{symbol}_INCLUDED");
     format!(
@@ -39,7 +40,8 @@ pub fn c_header(genome: &EncodedGenome<'_>, container: &[u8], symbol: &str) -> S
 
 /// Rust source with the container as a static with this name.
 #[must_use]
-pub fn rust_source(genome: &EncodedGenome<'_>, container: &[u8], symbol: &str) -> String {
+pub fn rust_source(genome: &GenomeFile, symbol: &str) -> String {
+    let container = genome.bytes();
     format!(
         "/// A minimal-surprise genome: {}.\n\
          pub static {symbol}: [u8; {}] = [\n{}];\n",

@@ -2,10 +2,11 @@
 
 use super::structures::{self, Classified};
 use crate::output::stdout_is_ascii;
+use minimal_surprise_controller::KERNEL_ID;
 use minimal_surprise_controller::codec::FORMAT_VERSION;
 use minimal_surprise_controller::network::Shape;
-use minimal_surprise_controller::{EncodedGenome, KERNEL_ID};
 use minimal_surprise_evolution::experiment::{EvolutionResult, Experiment};
+use minimal_surprise_evolution::genome_file::GenomeFile;
 use minimal_surprise_evolution::run_files::{BEST, CONFIG};
 use minimal_surprise_evolution::settings::{describe, model_name};
 use minimal_surprise_evolution::text::shell_path;
@@ -68,11 +69,10 @@ pub fn evolved(experiment: &Experiment, finding: &EvolutionResult, directory: &P
 
 /// The contents of a genome file.
 #[must_use]
-pub fn genome(encoded: &EncodedGenome<'_>, file_bytes: usize) -> String {
-    let topology = encoded.topology();
-    let provenance = encoded.provenance();
-    let weights: Vec<i16> = encoded.weights().collect();
-    let (action, prediction) = weights.split_at(topology.action_weights());
+pub fn genome(file: &GenomeFile) -> String {
+    let (topology, provenance) = (file.topology(), file.provenance());
+    let (genome, file_bytes) = (file.genome(), file.bytes().len());
+    let (action, prediction) = (genome.action_weights(), genome.prediction_weights());
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         let _ = writeln!(text, "{name:<19} {value}");

@@ -12,7 +12,7 @@ use minimal_surprise_evolution::files;
 use minimal_surprise_evolution::finished_run::{Progress, ReadRunError, complete};
 use minimal_surprise_evolution::lock::Holder;
 use minimal_surprise_evolution::run_dir::{Opened, RunDir, RunDirError};
-use minimal_surprise_sim::{Engine, Path as CodePath};
+use minimal_surprise_sim::{Engine, EnginePath};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::thread;
@@ -163,7 +163,7 @@ fn begin_or_resume(
         Err(RunDirError::InUse { holder, .. }) => return Ok(Outcome::Held(holder)),
         Err(error) => return Err(error),
     };
-    let path = CodePath::from_environment()?;
+    let path = EnginePath::from_environment()?;
     let finished = until_finished(
         &mut experiment,
         &held,
@@ -269,7 +269,7 @@ mod tests {
         );
         while !slower.is_finished() {
             slower
-                .advance(Engine::Fast, CodePath::best(), &stop)
+                .advance(Engine::Fast, EnginePath::best(), &stop)
                 .unwrap();
             held.save(&slower).unwrap();
             let mut now = contents(&directory);

@@ -1,7 +1,7 @@
 //! Actions by table: the action network is a function of a window, shared by all robots and
 //! repetitions of a genome.
 
-use super::path::Path;
+use super::path::EnginePath;
 use super::robot_word::{ACTION, HEADING_SHIFT};
 use super::window::{WINDOWS, WindowOrder};
 use minimal_surprise_controller::{Action, Controller, Turn};
@@ -48,10 +48,15 @@ impl ActionTable {
 
     /// Replaces the last genome. On AVX-512 all entries are computed at once; on other paths on
     /// first use, because few are used.
-    pub(super) fn prepare(&mut self, path: Path, controller: &Controller, order: &WindowOrder) {
+    pub(super) fn prepare(
+        &mut self,
+        path: EnginePath,
+        controller: &Controller,
+        order: &WindowOrder,
+    ) {
         match path {
             #[cfg(target_arch = "x86_64")]
-            Path::Avx512(cpu) => cpu.fill_action_table(controller, order, &mut self.entries),
+            EnginePath::Avx512(cpu) => cpu.fill_action_table(controller, order, &mut self.entries),
             _ => self.entries.fill(NOT_ASKED),
         }
     }
@@ -92,7 +97,7 @@ mod tests {
                 .collect();
             let controller = Controller::new(&Genome::from_weights(topology, &weights).unwrap());
             let order = WindowOrder::new(topology.model());
-            for path in Path::available() {
+            for path in EnginePath::available() {
                 let mut table = ActionTable::new();
                 table.prepare(path, &controller, &order);
                 for window in 0..WINDOWS as u16 {

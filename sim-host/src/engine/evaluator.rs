@@ -6,7 +6,7 @@ use super::fixed_predictions;
 use super::flips::{Drawer, FlipSource};
 use super::lanes::{BLOCK_STEPS, Predictor};
 use super::network::{PredictionWeights, expected_empty_at_start};
-use super::path::Path;
+use super::path::EnginePath;
 use super::recording::{Recorder, Recording};
 use super::robot_word::{self, ACTION, POSITION};
 use super::skipping;
@@ -124,7 +124,7 @@ pub struct Evaluator {
 impl Evaluator {
     /// An evaluator that uses the given path; the plain engine ignores it.
     #[must_use]
-    pub fn new(engine: Engine, path: Path) -> Self {
+    pub fn new(engine: Engine, path: EnginePath) -> Self {
         Self {
             engine,
             skips_repeats: true,
@@ -391,9 +391,9 @@ mod tests {
             topology.model(),
             vec![scenario.trial(seeds, 0, 0)],
         );
-        let plain = Evaluator::new(Engine::Plain, Path::best()).motion(&genome, &trials, 0);
+        let plain = Evaluator::new(Engine::Plain, EnginePath::best()).motion(&genome, &trials, 0);
         assert!(trials.flips[0].get().is_none());
-        let fast = Evaluator::new(Engine::Fast, Path::best()).motion(&genome, &trials, 0);
+        let fast = Evaluator::new(Engine::Fast, EnginePath::best()).motion(&genome, &trials, 0);
         assert!(trials.flips[0].get().is_some());
         assert_eq!(plain, fast);
     }

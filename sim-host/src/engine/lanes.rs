@@ -4,7 +4,7 @@
 //! in which lane, and at which time: lanes are independent of each other.
 
 use super::network::PredictionWeights;
-use super::path::Path;
+use super::path::EnginePath;
 use super::portable;
 #[cfg(target_arch = "x86_64")]
 use super::x86;
@@ -73,13 +73,15 @@ pub(super) enum Predictor {
 }
 
 impl Predictor {
-    pub(super) fn new(path: Path, weights: &PredictionWeights) -> Self {
+    pub(super) fn new(path: EnginePath, weights: &PredictionWeights) -> Self {
         match path {
-            Path::Portable => Self::Portable(Box::new(portable::Network::new(weights))),
+            EnginePath::Portable => Self::Portable(Box::new(portable::Network::new(weights))),
             #[cfg(target_arch = "x86_64")]
-            Path::Avx2(cpu) => Self::Avx2(cpu, Box::new(x86::avx2::Network::new(weights))),
+            EnginePath::Avx2(cpu) => Self::Avx2(cpu, Box::new(x86::avx2::Network::new(weights))),
             #[cfg(target_arch = "x86_64")]
-            Path::Avx512(cpu) => Self::Avx512(cpu, Box::new(x86::avx512::Network::new(weights))),
+            EnginePath::Avx512(cpu) => {
+                Self::Avx512(cpu, Box::new(x86::avx512::Network::new(weights)))
+            }
         }
     }
 

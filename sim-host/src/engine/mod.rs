@@ -44,6 +44,6 @@ mod window;
 mod x86;
 
 pub use evaluator::{Engine, Evaluator, TrialSet};
-pub use path::{PATH_VARIABLE, Path, PathError};
+pub use path::{EnginePath, PATH_VARIABLE, PathError};
 #[cfg(target_arch = "x86_64")]
 pub use x86::{Avx2, Avx512};

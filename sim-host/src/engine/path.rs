@@ -8,7 +8,7 @@ pub const PATH_VARIABLE: &str = "MINIMAL_SURPRISE_PATH";
 
 /// The instructions that the fast engine uses. All paths give the same results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Path {
+pub enum EnginePath {
     /// Instructions that every processor has.
     Portable,
     /// AVX2: predictions of 16 robots at once.
@@ -22,10 +22,10 @@ pub enum Path {
 
 /// This processor cannot run the path, or no path has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{PATH_VARIABLE} names the path {0:?}; this processor has {list}", list = Path::names())]
+#[error("{PATH_VARIABLE} names the path {0:?}; this processor has {list}", list = EnginePath::names())]
 pub struct PathError(String);
 
-impl Path {
+impl EnginePath {
     /// The paths that this processor can run, the best one last.
     #[must_use]
     pub fn available() -> Vec<Self> {

@@ -5,7 +5,7 @@
 
 use super::flips::FlipSource;
 use super::lanes::BLOCK_STEPS;
-use super::path::Path;
+use super::path::EnginePath;
 use super::repeats::History;
 use super::swarm::{Behaviour, ROBOTS_AT_ONCE, Swarm};
 
@@ -68,13 +68,13 @@ impl Recording {
 
 /// Runs worlds and records them.
 pub(super) struct Recorder {
-    pub(super) path: Path,
+    pub(super) path: EnginePath,
     rows: [Vec<u16>; BLOCK_STEPS],
     history: History,
 }
 
 impl Recorder {
-    pub(super) fn new(path: Path) -> Self {
+    pub(super) fn new(path: EnginePath) -> Self {
         Self {
             path,
             rows: Default::default(),

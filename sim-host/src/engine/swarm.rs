@@ -5,7 +5,7 @@
 
 use super::actions::ActionTable;
 use super::board::Board;
-use super::path::Path;
+use super::path::EnginePath;
 use super::robot_word::{self, ACTION};
 use super::window::{ACTION_BIT, AHEAD_BIT, WindowOrder};
 #[cfg(target_arch = "x86_64")]
@@ -59,14 +59,14 @@ impl Swarm {
     /// windows for their prediction networks, with the action just chosen.
     pub(super) fn step(
         &mut self,
-        path: Path,
+        path: EnginePath,
         behaviour: &mut Behaviour<'_>,
         flips: Option<&[u16]>,
         inputs: &mut [u16],
     ) {
         let movers = match path {
             #[cfg(target_arch = "x86_64")]
-            Path::Avx512(cpu) => {
+            EnginePath::Avx512(cpu) => {
                 if !self.board.is_narrow() {
                     self.board.close_edges();
                 }
