@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     bytes.extend_from_slice(codec::encode(genome, provenance, &mut buffer)?);
                 }
             }
-            experiment.advance(Engine::Fast, Path::best(), &never);
+            experiment.advance(Engine::Fast, EnginePath::best(), &never);
         }
         std::fs::write(format!("{folder}/{name}.genomes"), &bytes)?;
         println!("{name}: {} bytes", bytes.len());
