@@ -655,7 +655,7 @@ fn export_refuses_invalid_genomes_and_places_where_they_do_not_fit() {
     );
     refused(
         "export run/best.genome --format trajectory",
-        &["of a run directory"],
+        &["from a run directory"],
     );
 }
 

@@ -250,7 +250,10 @@ fn bad_flags_are_refused_with_the_flag_the_value_and_the_valid_range() {
             "flash old.genome --port nowhere --baud fast",
             "--baud = fast: expected a whole number from 1",
         ),
-        ("hil . --simulate --seed 1", "--seed and a run directory"),
+        (
+            "hil . --simulate --seed 1",
+            "--seed cannot be combined with a run directory",
+        ),
         ("hil . --simulate", "no complete run"),
     ];
     for (arguments, words) in runs {
@@ -276,13 +279,10 @@ fn a_path_that_is_not_a_port_is_refused() {
     }
     for arguments in all_commands("new.genome") {
         let run = evolver.run(&arguments);
-        assert_refused(
-            &run,
-            &["--port = new.genome: a file, folder or device that is no"],
-        );
+        assert_refused(&run, &["--port = new.genome: not a serial port"]);
     }
     let device = flash(&evolver, "new.genome", "/dev/null");
-    assert_refused(&device, &["/dev/null: a file, folder or device that is no"]);
+    assert_refused(&device, &["/dev/null: not a serial port"]);
 }
 
 #[test]

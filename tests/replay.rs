@@ -686,7 +686,7 @@ fn genomes_are_read_from_run_directories_and_export_overwrites_no_file() {
         assert_eq!(run.stdout, genome.stdout);
     }
     let run = evolver.run(&words("export run/best.genome --format trajectory"));
-    assert_refused(&run, &["run/best.genome", "of a run directory"]);
+    assert_refused(&run, &["run/best.genome", "from a run directory"]);
     evolver.write("there", b"mine");
     let run = evolver.run(&words("export run --format c --out there"));
     assert_refused(&run, &["--out = there: it exists; name another"]);

@@ -120,7 +120,7 @@ fn is_for_a_chip(format: Format) -> bool {
 fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
     if arguments.from.is_file() {
         return Err(BadInput::new(format!(
-            "{}: is a file; a trajectory can be exported only from a run directory",
+            "{}: a trajectory can be exported only from a run directory, not from a file",
             arguments.from.display()
         ))
         .into());
