@@ -62,8 +62,8 @@ fn evolved(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
         &AtomicBool::new(false),
         |_| {},
     )?;
-    if let Some(finding) = experiment.finding()? {
-        run.finish(&experiment, &finding)?;
+    if let Some(result) = experiment.result()? {
+        run.finish(&experiment, &result)?;
     }
     Ok(directory)
 }

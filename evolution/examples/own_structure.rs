@@ -49,8 +49,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         while !experiment.is_finished() {
             let _ = experiment.advance(Engine::Fast, EnginePath::best(), &AtomicBool::new(false));
         }
-        let finding = experiment.finding()?.ok_or("no generation was evaluated")?;
-        let poses = &finding.outcome.final_poses;
+        let result = experiment.result()?.ok_or("no generation was evaluated")?;
+        let poses = &result.outcome.final_poses;
         let blocks = 100.0 * Block.share(grid, poses)?;
         let lines = 100.0 * Structure::Line.share(grid, poses)?;
         println!("seed {seed}: {blocks:.0} % of the robots in blocks, {lines:.0} % in lines");

@@ -196,7 +196,7 @@ impl Experiment {
     ///
     /// # Errors
     /// [`WorldError`] if the trial does not fit its own grid.
-    pub fn finding(&self) -> Result<Option<EvolutionResult>, WorldError> {
+    pub fn result(&self) -> Result<Option<EvolutionResult>, WorldError> {
         let (Some(record), Some(genome)) = (self.history.last(), &self.best) else {
             return Ok(None);
         };

@@ -1,7 +1,4 @@
-//! Evolution of minimal-surprise swarms, as a library.
-//!
-//! Data flows one way: [`settings`] → [`population`] → [`experiment`] → [`checkpoint`] →
-//! [`finished_run`] and [`run_dir`] → [`reevaluation`].
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 pub mod checkpoint;

@@ -275,20 +275,20 @@ impl RunDir {
     pub fn finish(
         &self,
         experiment: &Experiment,
-        finding: &EvolutionResult,
+        result: &EvolutionResult,
     ) -> Result<(), FileError> {
         let mut buffer = [0; CONTAINER_BYTES_MAX];
-        let genome = codec::encode(&finding.genome, finding.provenance, &mut buffer)
+        let genome = codec::encode(&result.genome, result.provenance, &mut buffer)
             .expect("the buffer holds any genome");
         // Once more: the last checkpoint may have been written by a process that got no further.
         let table = generations(experiment);
         files::replace(&self.file(GENERATIONS), table.as_bytes())?;
         files::replace(&self.file(BEST), genome)?;
-        let final_state = json(&FinalFile::new(experiment.settings(), finding));
+        let final_state = json(&FinalFile::new(experiment.settings(), result));
         files::replace(&self.file(FINAL), final_state.as_bytes())?;
         let time = self.timer.spent().json();
         files::replace(&self.file(TIME), time.as_bytes())?;
-        files::replace(&self.file(DONE), format!("{}\n", finding.hash).as_bytes())?;
+        files::replace(&self.file(DONE), format!("{}\n", result.hash).as_bytes())?;
         tidy(&self.path)
     }
 

@@ -179,30 +179,30 @@ impl From<&Measures> for MeasuresOfRun {
 impl FinalFile {
     /// The file of a result.
     #[must_use]
-    pub fn new(settings: &Settings, finding: &EvolutionResult) -> Self {
+    pub fn new(settings: &Settings, result: &EvolutionResult) -> Self {
         let scenario = settings.scenario();
         Self {
             schema_version: SCHEMA_VERSION,
-            hash: finding.hash.to_string(),
+            hash: result.hash.to_string(),
             steps_hash: None,
-            steps_hash_v2: Some(finding.steps_hash.to_string()),
+            steps_hash_v2: Some(result.steps_hash.to_string()),
             seed: settings.seed(),
             seed_text: seed_text(settings.seed()),
             grid: scenario.grid().to_string(),
             sensor_model: model_name(settings.topology().model()).to_owned(),
             robots: scenario.robots(),
             steps: scenario.steps(),
-            generation: finding.provenance.generation,
-            repetition: finding.repetition,
-            fitness: finding.outcome.fitness(),
-            matches: finding.outcome.matches,
-            scored_bits: finding.outcome.scored_bits,
-            average_prediction: finding.outcome.average_prediction(),
-            names: names(&finding.structures.names()),
-            share: finding.share(),
-            measures: (&finding.measures).into(),
-            start: finding.starts.clone(),
-            r#final: finding.outcome.final_poses.clone(),
+            generation: result.provenance.generation,
+            repetition: result.repetition,
+            fitness: result.outcome.fitness(),
+            matches: result.outcome.matches,
+            scored_bits: result.outcome.scored_bits,
+            average_prediction: result.outcome.average_prediction(),
+            names: names(&result.structures.names()),
+            share: result.share(),
+            measures: (&result.measures).into(),
+            start: result.starts.clone(),
+            r#final: result.outcome.final_poses.clone(),
         }
     }
 }

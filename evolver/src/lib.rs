@@ -1,9 +1,4 @@
-//! The program `evolver`: its command line and commands, suites of evolutions, reports, exports, and
-//! the robot on a serial line.
-//!
-//! Evolution is the library `minimal-surprise-evolution`, and showing runs is
-//! `minimal-surprise-replay`; here [`suite`] → [`report`] → [`commands`] → [`cli`] put them to use,
-//! and [`robot`] and [`hil`] bring in a real robot.
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 #[macro_use]

@@ -201,21 +201,21 @@ fn generations(
     if !finished {
         return Ok(false);
     }
-    let finding = experiment
-        .finding()?
+    let result = experiment
+        .result()?
         .ok_or_else(|| anyhow::anyhow!("an evolution has at least one generation"))?;
-    run.finish(&experiment, &finding)?;
+    run.finish(&experiment, &result)?;
     if options.progress == ProgressMode::Json {
         let mut done = serde_json::json!({
             "event": "done",
-            "fitness": finding.outcome.fitness(),
-            "hash": finding.hash.to_string(),
+            "fitness": result.outcome.fitness(),
+            "hash": result.hash.to_string(),
             "run": text_of_path(run.path()),
         });
         add_seed(&mut done, experiment.settings().seed());
         show_line!("{done}");
     } else {
-        show!("\n{}", summary::evolved(&experiment, &finding, run.path()));
+        show!("\n{}", summary::evolved(&experiment, &result, run.path()));
     }
     Ok(true)
 }

@@ -25,13 +25,13 @@ pub fn program() -> &'static str {
 
 /// The result of an evolution, and what to do next.
 #[must_use]
-pub fn evolved(experiment: &Experiment, finding: &EvolutionResult, directory: &Path) -> String {
+pub fn evolved(experiment: &Experiment, result: &EvolutionResult, directory: &Path) -> String {
     let settings = experiment.settings();
     let classified = Classified {
         grid: settings.scenario().grid(),
-        poses: &finding.outcome.final_poses,
-        found: &finding.structures,
-        measures: Some(&finding.measures),
+        poses: &result.outcome.final_poses,
+        found: &result.structures,
+        measures: Some(&result.measures),
     };
     let program = program();
     let at = |file: &str| shell_path(&directory.join(file));
@@ -57,13 +57,13 @@ pub fn evolved(experiment: &Experiment, finding: &EvolutionResult, directory: &P
             "filled arrows"
         },
         picture = structures::highlighted(&classified),
-        structure = structures::name(&finding.structures),
-        share = 100.0 * finding.share(),
-        fitness = finding.outcome.fitness(),
-        generation = finding.provenance.generation,
+        structure = structures::name(&result.structures),
+        share = 100.0 * result.share(),
+        fitness = result.outcome.fitness(),
+        generation = result.provenance.generation,
         repetitions = settings.repetitions(),
         seed = settings.seed(),
-        hash = finding.hash,
+        hash = result.hash,
     )
 }
 

@@ -176,11 +176,11 @@ fn begin_or_resume(
     if !finished {
         return Ok(Outcome::Interrupted);
     }
-    let finding = experiment
-        .finding()
+    let result = experiment
+        .result()
         .expect("a trial fits its own grid")
         .expect("an evolution has at least one generation");
-    held.finish(&experiment, &finding)?;
+    held.finish(&experiment, &result)?;
     Ok(Outcome::Completed)
 }
 
@@ -276,8 +276,8 @@ mod tests {
             assert!(now.remove("checkpoint").is_some());
             assert_eq!(now, expected, "complete for all who look");
         }
-        let finding = slower.finding().unwrap().unwrap();
-        held.finish(&slower, &finding).unwrap();
+        let result = slower.result().unwrap().unwrap();
+        held.finish(&slower, &result).unwrap();
         assert_eq!(contents(&directory), expected);
     }
 
