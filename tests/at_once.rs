@@ -82,7 +82,7 @@ fn other_locks() -> PathBuf {
     folder.path().join("locks.so")
 }
 
-/// How often to repeat something: fewer times unless all cases are requested.
+/// Returns how often to repeat something: fewer times unless all cases are requested.
 fn times(reduced: usize, all: usize) -> usize {
     if full::all_cases() { all } else { reduced }
 }

@@ -37,7 +37,7 @@ fn message(found: &[(u16, i16)]) -> Vec<u8> {
     message
 }
 
-/// How many scans the bytes complete, and the neighbours after them.
+/// Returns how many scans the bytes complete, and the neighbours after them.
 fn feed(bytes: &[u8]) -> (usize, Vec<Detection>) {
     let mut module = RangeBearing::new();
     let mut neighbours = Neighbours::<NEIGHBOURS_MAX>::new();

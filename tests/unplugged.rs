@@ -77,7 +77,7 @@ impl SlotBytes {
         word
     }
 
-    /// Whether the word has changed since before the update.
+    /// Returns whether the word has changed since before the update.
     fn is_changed(&self, at: usize) -> bool {
         self.word(at) != self.before[at..at + WORD_BYTES]
     }
@@ -261,7 +261,7 @@ fn said(finished: &Finished) -> usize {
     lines.filter(|line| line.starts_with("error: ")).count()
 }
 
-/// Whether the genome in use is this one.
+/// Returns whether the genome in use is this one.
 fn is_in_use(genome: GenomeInUse, container: &[u8]) -> bool {
     matches!(genome, GenomeInUse::Slot { crc, .. } if Some(crc) == crc_of(container))
 }

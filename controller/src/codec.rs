@@ -276,7 +276,7 @@ impl<'a> EncodedGenome<'a> {
         self.topology
     }
 
-    /// Where the genome comes from.
+    /// Returns where the genome comes from.
     #[must_use]
     pub fn provenance(&self) -> Provenance {
         self.provenance

@@ -133,7 +133,7 @@ impl Shape {
         self.outputs as usize
     }
 
-    /// Whether every hidden neuron has a self-loop.
+    /// Returns whether every hidden neuron has a self-loop.
     #[must_use]
     pub const fn recurrent(self) -> bool {
         self.recurrent

@@ -113,7 +113,7 @@ impl SensorBits {
         self.0
     }
 
-    /// Whether sensor `index` reads occupied; false for an index beyond 15.
+    /// Returns whether sensor `index` reads occupied; false for an index beyond 15.
     #[must_use]
     pub const fn get(self, index: usize) -> bool {
         index < 16 && self.0 >> index & 1 == 1

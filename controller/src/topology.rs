@@ -161,7 +161,7 @@ impl Topology {
         self.model
     }
 
-    /// Which predictions are fixed.
+    /// Returns which predictions are fixed.
     #[must_use]
     pub const fn prediction(self) -> Prediction {
         self.prediction

@@ -124,7 +124,7 @@ pub fn decode(
     ))
 }
 
-/// Whether the numbers are such as an evolution under these settings has.
+/// Returns whether the numbers are such as an evolution under these settings has.
 fn check(stored: &Stored, settings: &Settings) -> Result<(), &'static str> {
     let (done, all) = (
         stored.history.len() as u64,

@@ -16,7 +16,7 @@ impl DamagedRuns {
         self.take(run, FinishedRun::read_if_complete(run)).flatten()
     }
 
-    /// What was read of a run, if that went well.
+    /// Returns what was read of a run, if that went well.
     pub fn take<T>(&mut self, run: &Path, read: Result<T, ReadRunError>) -> Option<T> {
         read.map_err(|error| self.add(run, error.cause())).ok()
     }
@@ -31,7 +31,7 @@ impl DamagedRuns {
         self.0.extend(other.0);
     }
 
-    /// Whether a run is among them.
+    /// Returns whether a run is among them.
     #[must_use]
     pub fn contains(&self, run: &Path) -> bool {
         self.0.contains_key(run)
@@ -44,7 +44,7 @@ impl DamagedRuns {
             .map(|(path, error)| (path.as_path(), error.as_str()))
     }
 
-    /// Whether there is none.
+    /// Returns whether there is none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()

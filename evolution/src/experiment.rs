@@ -186,7 +186,7 @@ impl Experiment {
         Some(record)
     }
 
-    /// Whether every generation has been evaluated.
+    /// Returns whether every generation has been evaluated.
     #[must_use]
     pub fn is_finished(&self) -> bool {
         self.history.len() as u64 >= u64::from(self.settings.generations())

@@ -178,7 +178,7 @@ pub enum StateError {
 }
 
 impl ReadRunError {
-    /// What is wrong, without what to do about it.
+    /// Returns what is wrong, without what to do about it.
     #[must_use]
     pub fn cause(&self) -> &Self {
         match self {

@@ -31,7 +31,7 @@ pub enum GenomeFileError {
 }
 
 impl GenomeFileError {
-    /// What is wrong, without the path.
+    /// Returns what is wrong, without the path.
     #[must_use]
     pub fn problem(&self) -> String {
         match self {
@@ -71,7 +71,7 @@ impl GenomeFile {
         self.genome.topology()
     }
 
-    /// Where the genome comes from.
+    /// Returns where the genome comes from.
     #[must_use]
     pub fn provenance(&self) -> Provenance {
         self.provenance

@@ -57,7 +57,7 @@ impl NewDir {
         }
     }
 
-    /// Where to write its files.
+    /// Returns where to write its files.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.part

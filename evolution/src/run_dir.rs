@@ -90,7 +90,7 @@ pub enum RunDirError {
 }
 
 impl RunDirError {
-    /// What is wrong, without what to do about it.
+    /// Returns what is wrong, without what to do about it.
     #[must_use]
     pub fn cause(&self) -> &dyn std::error::Error {
         match self {
@@ -245,7 +245,7 @@ impl RunDir {
         self.write(&self.checkpoint(experiment))
     }
 
-    /// What [`RunDir::save`] writes.
+    /// Returns what [`RunDir::save`] writes.
     #[must_use]
     pub fn checkpoint(&self, experiment: &Experiment) -> Checkpoint {
         Checkpoint {
@@ -314,7 +314,7 @@ fn settings_of_unfinished(path: &Path) -> Result<(Settings, String), RunDirError
     Ok(settings_and_text_of_run(path)?)
 }
 
-/// What a run that is not complete goes on from.
+/// Returns what a run that is not complete goes on from.
 fn unfinished(
     path: &Path,
     settings: Settings,

@@ -33,28 +33,28 @@ pub(crate) fn start() {
     }
 }
 
-/// Whether a terminal supports codes that move the cursor and change colours.
+/// Returns whether a terminal supports codes that move the cursor and change colours.
 pub(crate) fn terminal_has_codes() -> bool {
     let named = |term: &std::ffi::OsString| !term.is_empty() && term != "dumb";
     cfg!(windows) || env::var_os("TERM").as_ref().is_some_and(named)
 }
 
-/// Whether standard output is a terminal that can be drawn on.
+/// Returns whether standard output is a terminal that can be drawn on.
 pub(crate) fn stdout_is_screen() -> bool {
     *STDOUT_IS_TERMINAL && terminal_has_codes()
 }
 
-/// Whether standard error is a terminal that can be drawn on.
+/// Returns whether standard error is a terminal that can be drawn on.
 pub(crate) fn stderr_is_screen() -> bool {
     *STDERR_IS_TERMINAL && terminal_has_codes()
 }
 
-/// Whether standard output is a terminal with an ASCII-only locale.
+/// Returns whether standard output is a terminal with an ASCII-only locale.
 pub(crate) fn stdout_is_ascii() -> bool {
     *STDOUT_IS_TERMINAL && !*LOCALE_IS_UTF8
 }
 
-/// Whether standard error is a terminal with an ASCII-only locale.
+/// Returns whether standard error is a terminal with an ASCII-only locale.
 pub(crate) fn stderr_is_ascii() -> bool {
     *STDERR_IS_TERMINAL && !*LOCALE_IS_UTF8
 }
@@ -125,7 +125,7 @@ pub(crate) fn lost() -> Option<&'static io::Error> {
     LOST.get()
 }
 
-/// Whether the reader of standard output is gone; for a terminal, any error means that.
+/// Returns whether the reader of standard output is gone; for a terminal, any error means that.
 pub(crate) fn is_gone(error: &io::Error) -> bool {
     error.kind() == ErrorKind::BrokenPipe || *STDOUT_IS_TERMINAL
 }

@@ -22,7 +22,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Whether work should stop where it can be resumed.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// Whether work should stop where it can be resumed.
+/// Returns whether work should stop where it can be resumed.
 #[must_use]
 pub fn stop() -> &'static AtomicBool {
     &STOP

@@ -97,7 +97,7 @@ impl Theme {
     }
 }
 
-/// Whether a robot is drawn as an outline only.
+/// Returns whether a robot is drawn as an outline only.
 #[must_use]
 pub fn is_hollow(ink: Ink) -> bool {
     matches!(ink, Ink::Outside | Ink::Surprise(0))

@@ -269,7 +269,7 @@ impl Recording {
         }
     }
 
-    /// Whether a robot belongs to a structure in state `t`.
+    /// Returns whether a robot belongs to a structure in state `t`.
     #[must_use]
     pub fn is_member(&self, t: usize, robot: usize, structure: Structure) -> bool {
         let members = self.members.get(t).and_then(|robots| robots.get(robot));

@@ -178,7 +178,7 @@ impl Faults {
         Self(self.0 | other.0)
     }
 
-    /// Whether these include all of `other`.
+    /// Returns whether these include all of `other`.
     #[must_use]
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0

@@ -160,7 +160,7 @@ impl Server {
         }
     }
 
-    /// What has arrived so far.
+    /// Returns what has arrived so far.
     #[must_use]
     pub fn counters(&self) -> LineCounters {
         let errors = self.decoder.errors();

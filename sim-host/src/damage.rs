@@ -78,7 +78,7 @@ impl Area {
         })
     }
 
-    /// Whether the area contains the cell (x, y).
+    /// Returns whether the area contains the cell (x, y).
     #[must_use]
     pub fn contains(self, x: u16, y: u16) -> bool {
         let within = |at: u16, from: u16, to: u16| {

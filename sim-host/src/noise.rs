@@ -39,7 +39,7 @@ impl NoiseRate {
         self.per_65_536
     }
 
-    /// Whether nothing is ever flipped.
+    /// Returns whether nothing is ever flipped.
     #[must_use]
     pub fn is_none(self) -> bool {
         self.per_65_536 == 0

@@ -222,7 +222,7 @@ impl World {
         &self.readings
     }
 
-    /// What the robots decided in the last step; empty before the first.
+    /// Returns what the robots decided in the last step; empty before the first.
     #[must_use]
     pub fn decisions(&self) -> &[Decision] {
         &self.decisions

@@ -145,7 +145,7 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         unit * kept + within
     }
 
-    /// Whether power fails at this moment; the generator decides how.
+    /// Returns whether power fails at this moment; the generator decides how.
     fn fails_now(&mut self) -> Option<ChaCha8Rng> {
         let moment = self.counts.moments;
         self.counts.moments += 1;

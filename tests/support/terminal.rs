@@ -255,7 +255,7 @@ impl Terminal {
         status.exit_code()
     }
 
-    /// Whether the screen, the cursor and the line settings are as a shell needs them.
+    /// Returns whether the screen, the cursor and the line settings are as a shell needs them.
     #[must_use]
     pub fn is_restored(&self) -> bool {
         let screen = self.screen();

@@ -35,13 +35,13 @@ impl FileError {
         Self::at(path)(error)
     }
 
-    /// Whether nothing was written because the path exists.
+    /// Returns whether nothing was written because the path exists.
     #[must_use]
     pub fn is_exists(&self) -> bool {
         self.error.kind() == ErrorKind::AlreadyExists
     }
 
-    /// Whether another path would work, as opposed to a failure of the system.
+    /// Returns whether another path would work, as opposed to a failure of the system.
     #[must_use]
     pub fn is_bad_path(&self) -> bool {
         use ErrorKind as Kind;
@@ -91,7 +91,7 @@ pub fn parent(path: &Path) -> &Path {
     }
 }
 
-/// Whether a path exists, following symbolic links.
+/// Returns whether a path exists, following symbolic links.
 ///
 /// # Errors
 /// [`FileError`] if that cannot be determined, for example without permission to read the folder.

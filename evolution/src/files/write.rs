@@ -23,7 +23,7 @@ pub fn beside(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{hash:016x}.{number:016x}{PART}"))
 }
 
-/// Whether a name is a temporary one from [`beside`].
+/// Returns whether a name is a temporary one from [`beside`].
 #[must_use]
 pub fn is_part(name: &OsStr) -> bool {
     let numbers = || {

@@ -295,7 +295,7 @@ impl Needs {
         total(&self.disk)
     }
 
-    /// Whether the memory is there.
+    /// Returns whether the memory is there.
     ///
     /// # Errors
     /// [`TooMuch`] names the settings to change.
@@ -303,7 +303,7 @@ impl Needs {
         check(&self.memory, Place::Memory)
     }
 
-    /// Whether the disk that a directory is on, or will be, has the room.
+    /// Returns whether the disk that a directory is on, or will be, has the room.
     ///
     /// # Errors
     /// [`TooMuch`] names the settings to change.
@@ -351,7 +351,7 @@ impl NeedsOfRuns {
         };
     }
 
-    /// What they take.
+    /// Returns what they take.
     #[must_use]
     pub fn needs(&self) -> Needs {
         let mut needs = self.largest.clone();
@@ -378,7 +378,7 @@ impl NeedsOfRuns {
     }
 }
 
-/// Whether the bytes of all parts are there.
+/// Returns whether the bytes of all parts are there.
 fn check(parts: &[Part], place: Place) -> Result<(), TooMuch> {
     let needed = total(parts) as u64;
     match (

@@ -106,7 +106,7 @@ impl Overrides {
         self.values.remove(key);
     }
 
-    /// Where a setting was given; none if it was not.
+    /// Returns where a setting was given; none if it was not.
     #[must_use]
     pub fn place(&self, key: &str) -> Option<&Place> {
         self.values.get(key).map(|(_, place)| place)

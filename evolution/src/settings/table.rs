@@ -34,7 +34,7 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// What the setting means, as a sentence without its full stop.
+    /// Returns what the setting means, as a sentence without its full stop.
     #[must_use]
     pub fn meaning(&self) -> &'static str {
         self.meaning.trim().trim_end_matches('.')

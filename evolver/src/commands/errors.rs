@@ -90,7 +90,7 @@ pub(super) fn name_damaged(damaged: &DamagedRuns, again: Option<&str>) -> Exit {
 
 /// Errors about something that the user named.
 pub(super) trait AboutInput: std::error::Error + Send + Sync + Sized + 'static {
-    /// Whether it should not have been named, or named otherwise; else something broke.
+    /// Returns whether it should not have been named, or named otherwise; else something broke.
     fn is_bad_input(&self) -> bool;
 }
 
@@ -216,7 +216,12 @@ mod tests {
                 let error = FileError::at(&Path::new("run").join(name))(kind.into());
                 exit_of(&unusable(ReadRunError::File(error)))
             };
-            assert_eq!(of_run(DONE), exit);
+            // A directory in the place of the mark is damage.
+            let of_mark = match kind {
+                ErrorKind::IsADirectory => Exit::Failure,
+                _ => exit,
+            };
+            assert_eq!(of_run(DONE), of_mark);
             assert_eq!(of_run("best.genome"), Exit::Failure);
             assert_eq!(exit_of(&unusable(GalleryError::File(file()))), exit);
             let about = unusable(file()).context("--out = a file");

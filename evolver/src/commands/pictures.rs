@@ -122,7 +122,7 @@ impl PictureArgs {
         ]
     }
 
-    /// Whether any picture is requested.
+    /// Returns whether any picture is requested.
     pub(super) fn is_any(&self) -> bool {
         self.files().iter().any(|(_, file)| file.is_some())
     }

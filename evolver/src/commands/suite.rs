@@ -119,7 +119,7 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// Whether it is the suite as it is written.
+    /// Returns whether it is the suite as it is written.
     fn is_whole(&self) -> bool {
         flags(self).is_empty()
     }

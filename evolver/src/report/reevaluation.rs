@@ -18,7 +18,7 @@ pub struct Condition {
     pub reruns: Vec<Rerun>,
 }
 
-/// How many runs each structure dominates; a tie of k counts 1/k for each.
+/// Returns how many runs each structure dominates; a tie of k counts 1/k for each.
 #[must_use]
 pub fn name_counts(reruns: &[Rerun]) -> Vec<(Structure, f64)> {
     let count = |structure| {

@@ -68,7 +68,7 @@ impl<'a> SuiteProgress<'a> {
         Duration::try_from_secs_f64(left).ok()
     }
 
-    /// What is left, by what this process has worked.
+    /// Returns what is left, by what this process has worked.
     fn share_left(&self) -> Option<f64> {
         let worked = self.worked.get();
         (worked > 0).then(|| self.left.get() as f64 / worked as f64)

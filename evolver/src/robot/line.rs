@@ -265,7 +265,7 @@ fn open_port(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
     }
 }
 
-/// Whether this name exists and is not a terminal line.
+/// Returns whether this name exists and is not a terminal line.
 #[cfg(unix)]
 fn is_another_device(path: &Path) -> bool {
     use nix::libc::{O_NOCTTY, O_NONBLOCK};
@@ -287,7 +287,7 @@ fn open_port(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
     serialport::new(name, baud).timeout(SEND_TIMEOUT).open()
 }
 
-/// Whether the robot has lost the session.
+/// Returns whether the robot has lost the session.
 pub(super) fn is_lost_session(problem: &Problem) -> bool {
     matches!(
         problem,

@@ -94,7 +94,7 @@ pub fn length_and_crc(container: &[u8]) -> Option<(u16, u32)> {
     Some((length, u32::from_le_bytes(*crc)))
 }
 
-/// Whether the genome in use is this container.
+/// Returns whether the genome in use is this container.
 #[must_use]
 pub fn is_in_use(genome: GenomeInUse, container: &[u8]) -> bool {
     match genome {

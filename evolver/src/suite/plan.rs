@@ -158,7 +158,7 @@ impl PlannedRun {
 }
 
 impl<'a> Runs<'a> {
-    /// How many there are.
+    /// Returns how many there are.
     #[must_use]
     pub fn number(self) -> u64 {
         let all: u64 = self.plan.different.iter().map(|r| u64::from(r.runs)).sum();
@@ -191,13 +191,13 @@ impl<'a> Runs<'a> {
 }
 
 impl RunsAlike {
-    /// What they share, with the first seed of the experiment.
+    /// Returns what they share, with the first seed of the experiment.
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings.settings
     }
 
-    /// How many there are.
+    /// Returns how many there are.
     #[must_use]
     pub fn number(&self) -> u64 {
         self.number
@@ -363,7 +363,7 @@ fn different(experiments: &[PlannedExperiment]) -> Result<Vec<SeedRange>, Settin
     Ok(left.collect())
 }
 
-/// What is left of some seeds without those of other ranges, in order.
+/// Returns what is left of some seeds without those of other ranges, in order.
 fn without(seeds: Range<u64>, others: &[Range<u64>]) -> Vec<Range<u64>> {
     others.iter().fold(vec![seeds], |left, other| {
         left.into_iter()

@@ -64,7 +64,7 @@ pub fn look(
     Search::NotFound(asked.further_runs)
 }
 
-/// Whether a run is named after a structure; none if it is not done.
+/// Returns whether a run is named after a structure; none if it is not done.
 fn has(
     run: &PlannedRun,
     structure: Structure,

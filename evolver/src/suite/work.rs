@@ -45,7 +45,7 @@ impl Shard {
         }
     }
 
-    /// Where the hashes of the share's runs are written once all are done.
+    /// Returns where the hashes of the share's runs are written once all are done.
     #[must_use]
     pub fn hashes_file(self) -> String {
         match self.of {
@@ -61,7 +61,7 @@ impl Shard {
     }
 }
 
-/// How far a run is, by its files.
+/// Returns how far a run is, by its files.
 ///
 /// # Errors
 /// [`ReadRunError::Damaged`] if it is marked complete, and is not.

@@ -146,7 +146,7 @@ fn step(controller: &Controller, state: &mut State, sensors: SensorBits) -> Deci
     controller.step(state, sensors)
 }
 
-/// Whether the bytes are a genome.
+/// Returns whether the bytes are a genome.
 #[inline(never)]
 fn decode(bytes: &[u8]) -> bool {
     EncodedGenome::decode(bytes).is_ok()

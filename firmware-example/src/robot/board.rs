@@ -37,7 +37,7 @@ pub trait Board {
     /// Puts a byte on the line; returns whether there was room for it.
     fn send(&mut self, byte: u8) -> bool;
 
-    /// Whether another control period has begun since the last call.
+    /// Returns whether another control period has begun since the last call.
     fn period_begun(&mut self) -> bool;
 
     /// Waits until a byte arrives or a control period begins; may return early.
@@ -46,7 +46,7 @@ pub trait Board {
     /// Feeds the watchdog, which postpones its restart of the robot.
     fn feed_watchdog(&mut self);
 
-    /// Whether the watchdog has caused the last restart.
+    /// Returns whether the watchdog has caused the last restart.
     fn restarted_by_watchdog(&self) -> bool;
 
     /// Logs a status report.

@@ -83,7 +83,7 @@ pub(crate) fn byte_from_module() -> Option<u8> {
     with(&MODULE, |module| module.bytes.pop_front()).flatten()
 }
 
-/// Whether a control period has begun since the last call.
+/// Returns whether a control period has begun since the last call.
 pub(crate) fn take_period() -> bool {
     PERIOD_BEGUN.swap(false, Ordering::Relaxed)
 }

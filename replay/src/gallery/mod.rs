@@ -262,7 +262,7 @@ impl Found {
     }
 }
 
-/// Whether a folder is marked as a gallery.
+/// Returns whether a folder is marked as a gallery.
 ///
 /// # Errors
 /// [`FileError`] if the folder cannot be read.

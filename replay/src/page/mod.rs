@@ -136,7 +136,7 @@ fn about(recording: &Recording) -> Value {
     })
 }
 
-/// What the page generates the noise from; `None` without noise.
+/// Returns what the page generates the noise from; `None` without noise.
 fn flips(controller: &ControllerData, origin: &Origin) -> Option<Value> {
     let key = controller.noise.key();
     let words = key.as_chunks::<4>().0.iter();
@@ -155,7 +155,7 @@ fn flips(controller: &ControllerData, origin: &Origin) -> Option<Value> {
     })
 }
 
-/// Which inks are drawn as outlines.
+/// Returns which inks are drawn as outlines.
 pub(super) fn hollow() -> Value {
     let inks = [
         ("plain", Ink::Plain),
@@ -194,7 +194,7 @@ pub(super) fn source(name: &str) -> String {
     last.map_or_else(|| name.to_owned(), |last| last.into_owned())
 }
 
-/// Which predictions are fixed.
+/// Returns which predictions are fixed.
 #[must_use]
 pub fn prediction_name(topology: Topology) -> String {
     match topology.prediction() {

@@ -379,7 +379,7 @@ fn picked(player: &Player<'_>, scene: &Scene, paints: Paints) -> Vec<Line<'stati
     lines
 }
 
-/// What the arrows mean.
+/// Returns what the arrows mean.
 fn legend(player: &Player<'_>, paints: Paints) -> Vec<Line<'static>> {
     let arrow = |ink| {
         let (x, y, heading) = (0, 0, Heading::East as u8);

@@ -138,7 +138,7 @@ impl Board {
         self.columns.reset(self.height, self.width);
     }
 
-    /// Whether a line of either plane is a single word.
+    /// Returns whether a line of either plane is a single word.
     pub(super) fn is_narrow(&self) -> bool {
         self.width.max(self.height) <= Plane::SIDE_MAX_ONE_WORD
     }

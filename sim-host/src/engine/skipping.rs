@@ -125,7 +125,7 @@ fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-/// How many leading blocks equal `block`.
+/// Returns how many leading blocks equal `block`.
 fn alike_at_start(blocks: &[u64], block: u64) -> usize {
     let (chunks, _) = blocks.as_chunks::<8>();
     let all_alike = |chunk: &&[u64; 8]| chunk.iter().fold(0, |d, &b| d | (b ^ block)) == 0;

@@ -157,7 +157,7 @@ impl<'a> Lines<'a> {
             .ok_or_else(|| Problem::Ended { missing: missing() }.at(line))
     }
 
-    /// Whether a line with text follows.
+    /// Returns whether a line with text follows.
     fn text_follows(&mut self) -> bool {
         self.lines
             .peek()

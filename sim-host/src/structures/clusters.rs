@@ -140,7 +140,7 @@ pub(super) fn find(field: &Field) -> Clusters {
     }
 }
 
-/// Whether each robot is a core.
+/// Returns whether each robot is a core.
 fn cores(field: &Field) -> Vec<bool> {
     let mut core = vec![false; field.robots()];
     for robot in field.row_by_row() {

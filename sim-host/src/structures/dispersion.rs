@@ -53,7 +53,7 @@ pub(super) fn in_squares(field: &Field) -> Vec<bool> {
     members
 }
 
-/// Whether each robot is in a triangular lattice: a centre or one of the eight around it.
+/// Returns whether each robot is in a triangular lattice: a centre or one of the eight around it.
 pub(super) fn in_triangular_lattices(field: &Field) -> Vec<bool> {
     let mut members = vec![false; field.robots()];
     for robot in field.row_by_row() {
@@ -66,7 +66,7 @@ pub(super) fn in_triangular_lattices(field: &Field) -> Vec<bool> {
     members
 }
 
-/// Whether each robot has at most one Moore neighbour and is not `excluded`.
+/// Returns whether each robot has at most one Moore neighbour and is not `excluded`.
 pub(super) fn randomly_dispersed(field: &Field, excluded: impl Fn(u32) -> bool) -> Vec<bool> {
     let mut members = vec![false; field.robots()];
     for robot in field.row_by_row() {

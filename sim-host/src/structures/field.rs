@@ -48,7 +48,7 @@ impl<'a> Field<'a> {
         (found != EMPTY).then_some(found)
     }
 
-    /// Whether the cell (dx, dy) from a robot is occupied.
+    /// Returns whether the cell (dx, dy) from a robot is occupied.
     pub(super) fn occupied(&self, robot: u32, offset: (i32, i32)) -> bool {
         self.near(robot, offset).is_some()
     }

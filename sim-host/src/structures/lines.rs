@@ -205,7 +205,7 @@ fn without_outward<'a>(field: &Field, axis: Axis, run: &'a [u32]) -> &'a [u32] {
     }
 }
 
-/// Whether no two adjacent cells on the same side of the line are occupied.
+/// Returns whether no two adjacent cells on the same side of the line are occupied.
 fn sides_are_free(field: &Field, axis: Axis, line: &[u32], ring: bool) -> bool {
     let (dx, dy) = axis.forward().ahead();
     [(dy, dx), (-dy, -dx)].into_iter().all(|side| {

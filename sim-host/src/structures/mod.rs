@@ -97,7 +97,7 @@ const _: () = {
 };
 
 impl Membership {
-    /// Whether the robot belongs to a structure.
+    /// Returns whether the robot belongs to a structure.
     #[must_use]
     pub fn contains(self, structure: Structure) -> bool {
         self.0 >> structure as u8 & 1 == 1
@@ -140,7 +140,7 @@ impl core::fmt::Display for Structure {
 
 /// A pattern of robots: one of the paper's structures, or your own.
 pub trait Pattern {
-    /// Whether each robot belongs to the pattern, robot 0 first.
+    /// Returns whether each robot belongs to the pattern, robot 0 first.
     ///
     /// # Errors
     /// [`WorldError`] if a robot is outside the grid or two share a cell.
@@ -235,7 +235,7 @@ pub fn classify(grid: Grid, poses: &[Pose]) -> Result<Structures, WorldError> {
 }
 
 impl Structures {
-    /// Whether a robot belongs to a structure; false for an index beyond the swarm.
+    /// Returns whether a robot belongs to a structure; false for an index beyond the swarm.
     #[must_use]
     pub fn contains(&self, structure: Structure, robot: u32) -> bool {
         self.members(structure)

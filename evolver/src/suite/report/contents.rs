@@ -149,7 +149,7 @@ impl SuiteReport {
         })
     }
 
-    /// How long all runs took, in words; nothing if it was not measured.
+    /// Returns how long all runs took, in words; nothing if it was not measured.
     pub(super) fn time_in_words(&self) -> Option<String> {
         let in_words = |s: f64| seconds(Duration::from_secs_f64(s));
         (self.time.sittings > 0).then(|| {

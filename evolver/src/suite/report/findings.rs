@@ -196,7 +196,7 @@ fn of_runs(number: u32, group: &Group) -> String {
     format!("{number} of {} runs{}", group.runs.len(), unfinished(group))
 }
 
-/// How many runs are planned, if they are not all finished.
+/// Returns how many runs are planned, if they are not all finished.
 fn unfinished(group: &Group) -> String {
     if group.is_complete() {
         String::new()

@@ -102,7 +102,7 @@ pub struct Group {
 }
 
 impl Group {
-    /// Whether every planned run is finished.
+    /// Returns whether every planned run is finished.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.runs.len() == self.planned
@@ -119,7 +119,7 @@ impl Group {
         format!("{}{beyond}", self.label)
     }
 
-    /// How many of its runs are finished, in words.
+    /// Returns how many of its runs are finished, in words.
     #[must_use]
     pub fn counted(&self) -> String {
         if self.is_complete() {
@@ -164,7 +164,7 @@ pub struct Reevaluated {
 }
 
 impl Reevaluated {
-    /// What each genome forms in more than half of its starts.
+    /// Returns what each genome forms in more than half of its starts.
     #[must_use]
     pub fn orientations(&self) -> Vec<Option<LineOrientation>> {
         let of_genome = |starts: &Vec<NewStart>| {

@@ -265,7 +265,7 @@ pub const GROUPING: &str = "grouping";
 /// Runs named after no structure.
 pub const NONE: &str = "none";
 
-/// Whether a structure is one of the three groupings.
+/// Returns whether a structure is one of the three groupings.
 #[must_use]
 pub fn is_grouping(structure: Structure) -> bool {
     matches!(

@@ -48,7 +48,7 @@ pub struct Test {
 }
 
 impl Test {
-    /// Whether it does not speak against the two being the same.
+    /// Returns whether it does not speak against the two being the same.
     #[must_use]
     pub fn compatible(self) -> bool {
         self.p >= SIGNIFICANT
@@ -201,7 +201,7 @@ fn drawn(totals: &[u32], row: u32, observed: f64) -> f64 {
     f64::from(extreme + 1) / f64::from(DRAWN_TABLES + 1)
 }
 
-/// Whether successes and failures may be equally likely: exact binomial test, two-sided.
+/// Returns whether successes and failures may be equally likely: exact binomial test, two-sided.
 #[must_use]
 pub fn sign(successes: u32, failures: u32) -> Test {
     let of = u64::from(successes) + u64::from(failures);

@@ -63,13 +63,13 @@ impl Value {
         }
     }
 
-    /// Whether it is of a test that could have found a difference.
+    /// Returns whether it is of a test that could have found a difference.
     pub fn could_differ(&self) -> bool {
         let too_few = self.test == Some(SIGN_TEST) && self.of < RUNS_MIN;
         self.p.is_some() && !too_few
     }
 
-    /// Whether it is the same as another, from another table.
+    /// Returns whether it is the same as another, from another table.
     pub fn repeats(&self, other: &Self) -> bool {
         (&self.setting, &self.what) == (&other.setting, &other.what)
             && (self.of, self.ours, self.paper, self.p)
@@ -136,7 +136,7 @@ struct Shared<'a> {
 }
 
 impl Shared<'_> {
-    /// Whether a category is one of these: the groupings are told apart or are not.
+    /// Returns whether a category is one of these: the groupings are told apart or are not.
     fn has(&self, category: &str) -> bool {
         let together = self.paper.is_some_and(|d| d.percent.contains_key(GROUPING));
         if category == GROUPING {
@@ -354,7 +354,7 @@ fn share_table(
     }
 }
 
-/// How many runs form any of the groupings, if the paper tells them apart.
+/// Returns how many runs form any of the groupings, if the paper tells them apart.
 fn groupings_together(shared: &Shared<'_>) -> Option<String> {
     let paper = shared.paper.filter(|_| shared.of == Of::Structures)?;
     let groupings = Structure::ALL.into_iter().filter(|s| is_grouping(*s));
@@ -538,7 +538,7 @@ impl Among {
         }
     }
 
-    /// How many of the paper's runs these are.
+    /// Returns how many of the paper's runs these are.
     fn of_paper(self, shares: &Distribution) -> u32 {
         match self {
             Self::LineRuns => {
@@ -783,7 +783,7 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
     Some(table)
 }
 
-/// What the genomes of every setting formed from new starts.
+/// Returns what the genomes of every setting formed from new starts.
 fn new_starts(gathered: &Gathered) -> Option<Table> {
     let done = gathered
         .reevaluations
@@ -977,7 +977,7 @@ impl Value {
         ))
     }
 
-    /// What the test says.
+    /// Returns what the test says.
     pub(super) fn verdict_in_words(&self) -> Option<String> {
         let compatible = if self.compatible? {
             "compatible"
