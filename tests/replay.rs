@@ -528,7 +528,7 @@ fn impossible_numbers_are_refused_in_every_file_of_a_run() {
         (
             "DONE",
             hash.replace(['0', '1'], "2"),
-            "another hash than DONE",
+            "a different hash from DONE",
         ),
         ("generations.csv", first_fitness("inf"), "from 0 to 1"),
         ("generations.csv", first_fitness("NaN"), "from 0 to 1"),
@@ -736,7 +736,7 @@ fn a_run_with_the_genome_or_the_state_of_another_run_is_refused_by_every_replay(
         (
             "final.json",
             evolver.read("other/final.json"),
-            "final.json has another hash than DONE",
+            "final.json has a different hash from DONE",
         ),
         ("final.json", other_hash.into_bytes(), steps),
     ];

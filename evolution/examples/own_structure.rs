@@ -17,7 +17,7 @@ impl Pattern for Block {
     fn members(&self, grid: Grid, poses: &[Pose]) -> Result<Vec<bool>, WorldError> {
         check_poses(grid, poses)?;
         let occupied: HashSet<(u16, u16)> = poses.iter().map(|pose| (pose.x, pose.y)).collect();
-        // The cell so many columns and rows further on, around the torus.
+        // The cell at this offset, around the torus.
         let is_occupied = |pose: &Pose, columns: i32, rows: i32| {
             let x = (i32::from(pose.x) + columns).rem_euclid(grid.width().into());
             let y = (i32::from(pose.y) + rows).rem_euclid(grid.height().into());

@@ -131,7 +131,7 @@ fn check(stored: &Stored, settings: &Settings) -> Result<(), &'static str> {
         u64::from(settings.generations()),
     );
     if done > all || stored.best.is_some() != (done > 0) {
-        return Err("it has another number of generations than config.toml");
+        return Err("it has a different number of generations from config.toml");
     }
     // The last generation is not followed by another population.
     if u64::from(stored.generation) != done.min(all - 1) {

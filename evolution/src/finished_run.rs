@@ -460,12 +460,12 @@ impl FinishedRun {
             })
         };
         if genome.topology() != settings.topology() {
-            return inconsistent("best.genome has another topology than config.toml");
+            return inconsistent("best.genome has a different topology from config.toml");
         }
         if state.grid != settings.scenario().grid()
             || state.starts.len() != settings.scenario().robots() as usize
         {
-            return inconsistent("final.json has another grid or swarm size than config.toml");
+            return inconsistent("final.json has a different grid or swarm size from config.toml");
         }
         if state.repetition >= settings.repetitions() {
             return inconsistent("final.json is of a repetition that config.toml does not have");
@@ -474,18 +474,18 @@ impl FinishedRun {
             || state.average_prediction.len() != settings.topology().sensors()
         {
             return inconsistent(
-                "final.json has another number of steps or sensors than config.toml",
+                "final.json has a different number of steps or sensors from config.toml",
             );
         }
         let hash = recorded_hash(path)?;
         if state.hash != hash {
-            return inconsistent("final.json has another hash than DONE");
+            return inconsistent("final.json has a different hash from DONE");
         }
         let table_bytes = limits::most(limits::table_bytes(&settings));
         let best_fitness = best_fitness(&path.join(GENERATIONS), table_bytes)?;
         if best_fitness.len() != settings.generations() as usize {
             return inconsistent(
-                "generations.csv has another number of lines than config.toml has generations",
+                "generations.csv has a different number of lines from the generations in config.toml",
             );
         }
         let provenance = genome.provenance();

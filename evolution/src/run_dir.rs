@@ -314,7 +314,7 @@ fn settings_of_unfinished(path: &Path) -> Result<(Settings, String), RunDirError
     Ok(settings_and_text_of_run(path)?)
 }
 
-/// Returns what a run that is not complete goes on from.
+/// Returns the state from which an incomplete run is resumed.
 fn unfinished(
     path: &Path,
     settings: Settings,
@@ -337,7 +337,7 @@ fn finished(directory: &Path) -> Result<Option<String>, RunDirError> {
     let Some(hash) = complete(directory)? else {
         return Ok(None);
     };
-    // It is only in the way of the eye, and the directory need not be ours.
+    // Cosmetic: failure to remove files is ignored; the directory may belong to another user.
     let _ = tidy(directory);
     Ok(Some(hash))
 }

@@ -295,7 +295,7 @@ impl Needs {
         total(&self.disk)
     }
 
-    /// Returns whether the memory is there.
+    /// Checks that there is enough memory.
     ///
     /// # Errors
     /// [`TooMuch`] names the settings to change.
@@ -303,7 +303,7 @@ impl Needs {
         check(&self.memory, Place::Memory)
     }
 
-    /// Returns whether the disk that a directory is on, or will be, has the room.
+    /// Checks that there is enough space on the disk of a directory, which need not exist.
     ///
     /// # Errors
     /// [`TooMuch`] names the settings to change.
@@ -334,7 +334,7 @@ pub struct NeedsOfRuns {
 }
 
 impl NeedsOfRuns {
-    /// So many runs under these settings.
+    /// Adds this many runs with these settings.
     pub fn add(&mut self, settings: &Settings, runs: u64, threads: f64) {
         if runs == 0 {
             return;
@@ -351,7 +351,7 @@ impl NeedsOfRuns {
         };
     }
 
-    /// Returns what they take.
+    /// Returns the memory and disk they need.
     #[must_use]
     pub fn needs(&self) -> Needs {
         let mut needs = self.largest.clone();
@@ -378,7 +378,7 @@ impl NeedsOfRuns {
     }
 }
 
-/// Returns whether the bytes of all parts are there.
+/// Checks that all parts fit.
 fn check(parts: &[Part], place: Place) -> Result<(), TooMuch> {
     let needed = total(parts) as u64;
     match (

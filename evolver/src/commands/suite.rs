@@ -68,7 +68,7 @@ pub enum Verb {
         #[arg(long)]
         gallery: bool,
     },
-    /// Hand the runs to a cluster.
+    /// Submit the runs to a cluster.
     Submit {
         /// Which runs.
         #[command(flatten)]

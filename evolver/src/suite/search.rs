@@ -25,8 +25,8 @@ pub enum Search {
     NotFound(u32),
 }
 
-/// Looks through the files of a suite; of the runs beyond the plan, only those after so many, which
-/// are known not to have the structure. A damaged run is not done.
+/// Searches the files of a suite. The first `after` runs beyond the plan are known not to have the
+/// structure and are skipped. A damaged run counts as not done.
 pub fn look(
     plan: &Plan,
     asked: &Resilience,

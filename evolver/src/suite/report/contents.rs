@@ -86,7 +86,7 @@ pub struct SuiteReport {
     pub figures: Vec<Figure>,
     /// How long all runs took, each counted once.
     pub time: TimeSpent,
-    /// How it was made.
+    /// Provenance of the runs.
     pub making: Vec<Provenance>,
 }
 

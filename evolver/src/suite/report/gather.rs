@@ -41,7 +41,7 @@ pub enum GatherError {
     },
 }
 
-/// A finished run and what is known of it.
+/// A finished run with its structures and lines.
 #[derive(Clone, Debug)]
 pub struct GatheredRun {
     /// Its name.

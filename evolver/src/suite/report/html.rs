@@ -178,7 +178,7 @@ fn cell(value: &Value) -> String {
 
 fn write_making(page: &mut String, report: &SuiteReport) {
     page.push_str(
-        "<h2>How it was made</h2>\n<div class=\"wide\"><table><thead><tr><th>runs</th><th>seeds</th>\
+        "<h2>Provenance</h2>\n<div class=\"wide\"><table><thead><tr><th>runs</th><th>seeds</th>\
          <th>minutes, CPU / clock</th><th>command and program</th><th>SHA-256 of the outcomes</th></tr></thead><tbody>\n",
     );
     for making in &report.making {

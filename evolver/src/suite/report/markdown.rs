@@ -49,7 +49,7 @@ pub fn text(report: &SuiteReport) -> String {
             figure.id
         );
     }
-    text += "\n## How it was made\n\n| experiment | setting | runs | seeds | minutes, CPU / clock | command | program | SHA-256 of the outcomes |\n|---|---|---|---|---|---|---|---|\n";
+    text += "\n## Provenance\n\n| experiment | setting | runs | seeds | minutes, CPU / clock | command | program | SHA-256 of the outcomes |\n|---|---|---|---|---|---|---|---|\n";
     for making in &report.making {
         let _ = writeln!(
             text,

@@ -941,7 +941,7 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
         // The figure has the name itself.
         id: source.map_or_else(|| format!("numbers-{name}"), Source::file_name),
         source: in_words(source),
-        title: format!("{name}: what becomes of a damaged {}", resilient.structure),
+        title: format!("{name}: effect of damage on a {}", resilient.structure),
         notes,
         columns: columns.map(str::to_owned).to_vec(),
         rows,
