@@ -119,7 +119,7 @@ fn the_page_shows_the_same_scenes_as_the_program_and_hashes_the_steps_of_the_run
         assert_same_scenes(&mut browser, &recording);
         let (status, words) = checked(&mut browser);
         assert_eq!(status, "good", "{words}");
-        assert!(words.contains("what the run recorded"), "{words}");
+        assert!(words.contains("identical to the recorded run"), "{words}");
         let hash: String = browser.evaluate("replay.state().check.computed");
         assert_eq!(hash, recording.origin.steps_hash.as_ref().unwrap().hash);
         let fitness: f64 = browser.evaluate(&format!("replay.fitness({})", recording.steps()));
@@ -161,7 +161,7 @@ fn pages_of_damaged_swarms_genomes_and_trajectories_say_what_their_steps_can_be_
     open(&mut browser, &evolver.folder().join("genome.html"));
     let (status, words) = checked(&mut browser);
     assert_eq!(status, "good");
-    assert!(words.contains("what the program computed"), "{words}");
+    assert!(words.contains("that the program computed"), "{words}");
 
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/exchange/c/agent_trajectory");
     succeed(
@@ -647,7 +647,7 @@ fn input_that_cannot_be_shown_is_refused_and_nothing_is_overwritten() {
     .unwrap();
     let written = succeed(&evolver, "gallery runs --out new");
     assert!(
-        written.stdout.contains("1 that have not ended"),
+        written.stdout.contains("left out: 1 unfinished"),
         "{written:?}"
     );
 }

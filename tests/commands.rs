@@ -287,7 +287,7 @@ fn damage_refuses_impossible_settings() {
     };
     assert_refused(
         &damage("--area 2,3,8 --remove"),
-        &["--area", "2,3,8", "four cells"],
+        &["--area", "2,3,8", "four coordinates"],
     );
     assert_refused(
         &damage("--area 2,3,8,15 --remove"),

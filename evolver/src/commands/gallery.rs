@@ -38,7 +38,7 @@ pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
         .map_err(unusable)?;
     let left_out = match written.unfinished {
         0 => String::new(),
-        n => format!("; {n} unfinished runs left out"),
+        n => format!("; left out: {n} unfinished"),
     };
     if written.by_another {
         tell!("another process has written the same gallery in the meantime");
