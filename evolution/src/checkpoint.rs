@@ -1,7 +1,7 @@
 //! Checkpoints: an evolution between two generations, in one file.
 //!
 //! postcard, then its CRC-32C in four bytes, little-endian. It holds the text of the run's
-//! `config.toml`, so that a run is never continued under other settings.
+//! `config.toml`, so that a run is never continued with other settings.
 
 use crate::experiment::{Experiment, GenerationRecord};
 use crate::population::Population;
@@ -124,7 +124,7 @@ pub fn decode(
     ))
 }
 
-/// Returns whether the numbers are such as an evolution under these settings has.
+/// Checks that the numbers are possible for an evolution with these settings.
 fn check(stored: &Stored, settings: &Settings) -> Result<(), &'static str> {
     let (done, all) = (
         stored.history.len() as u64,

@@ -3,7 +3,7 @@
 use minimal_surprise_sim::seed::{Stream, uniform_below};
 use std::fmt;
 
-/// Most genomes of a tournament.
+/// Maximum number of genomes of a tournament.
 const TOURNAMENT_MAX: u32 = 1_000_000;
 
 /// How parents are chosen.

@@ -103,7 +103,7 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Most letters and digits of a text that [`identifier`] keeps: C distinguishes 63 characters.
+/// Maximum number of letters and digits of a text that [`identifier`] keeps: C distinguishes 63 characters.
 const IDENTIFIER_MAX: usize = 24;
 
 /// Reserved words of C and Rust.

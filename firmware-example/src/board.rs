@@ -2,7 +2,7 @@
 //!
 //! Linking this module also links the logger and the critical section that it needs.
 //!
-//! With `unsafe` code: the wheels' register is an address.
+//! Contains `unsafe` code: the wheels' register is an address.
 #![allow(unsafe_code)]
 
 use crate::faults::{Fault, WheelsOff};

@@ -9,7 +9,7 @@
 //! [`guard_stack`] forbids access below RAM. So a stack overflow is a fault immediately, and no
 //! variable is overwritten.
 //!
-//! With `unsafe` code: registers are addresses, and the handlers are in assembler.
+//! Contains `unsafe` code: registers are addresses, and the handlers are in assembler.
 #![allow(unsafe_code)]
 
 use core::{fmt, ptr};

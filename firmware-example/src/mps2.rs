@@ -3,7 +3,7 @@
 //! Its wheels are two lights, and it detects one simulated neighbour; the host drives it with step
 //! requests.
 //!
-//! With `unsafe` code: device registers are addresses, and so are the arguments of semihosting.
+//! Contains `unsafe` code: device registers are addresses, and so are the arguments of semihosting.
 #![allow(unsafe_code)]
 
 use crate::board::WHEELS;

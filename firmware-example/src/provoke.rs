@@ -1,6 +1,6 @@
 //! Provokes faults to check that the wheels stop. For the programs `faults`, under QEMU only.
 //!
-//! With `unsafe` code: only unsafe code causes faults.
+//! Contains `unsafe` code: only unsafe code causes faults.
 #![allow(unsafe_code)]
 
 use core::arch::asm;

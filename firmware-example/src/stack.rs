@@ -1,6 +1,6 @@
 //! Measures how much stack a function uses.
 //!
-//! With `unsafe` code: it writes to the unused stack, and later checks which words have changed.
+//! Contains `unsafe` code: it writes to the unused stack, and later checks which words have changed.
 #![allow(unsafe_code)]
 
 use core::ptr;

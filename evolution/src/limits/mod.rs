@@ -478,7 +478,7 @@ pub fn checkpoint_bytes(settings: &Settings) -> f64 {
     f64::from(settings.population()) * genome + f64::from(settings.generations()) * 70.0
 }
 
-/// Most bytes that are read of a file with such an estimate.
+/// Maximum number of bytes read from a file with this estimate.
 #[must_use]
 pub fn most(estimate: f64) -> u64 {
     // As no estimate is off by more than a factor of two; small files have a head.

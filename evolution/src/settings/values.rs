@@ -3,10 +3,10 @@
 use minimal_surprise_controller::{Prediction, SensorModel, Template, Topology};
 use minimal_surprise_sim::Grid;
 
-/// Most generations of a run, genomes of a population and repetitions of an evaluation.
+/// Maximum number of generations of a run, genomes of a population and repetitions of an evaluation.
 pub const COUNT_MAX: u32 = 1_000_000;
 
-/// Most threads of a command.
+/// Maximum number of threads of a command.
 pub const THREADS_MAX: u32 = 1024;
 
 pub(super) const PROBABILITY: &str = "expected a probability from 0 to 1";

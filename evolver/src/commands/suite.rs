@@ -84,7 +84,7 @@ pub enum Verb {
             allow_hyphen_values = true
         )]
         shards: String,
-        /// Most tasks at once.
+        /// Maximum number of tasks at once.
         #[arg(long, value_name = "N", allow_hyphen_values = true)]
         at_once: Option<String>,
         /// Only show what would be submitted.

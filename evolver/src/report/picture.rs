@@ -5,7 +5,7 @@ use console::{Style, Term};
 use minimal_surprise_sim::drawing::draw_members;
 use minimal_surprise_sim::{Grid, Pose};
 
-/// Most rows and columns of the picture if the output is not a terminal.
+/// Maximum number of rows and columns of the picture if the output is not a terminal.
 const WITHOUT_TERMINAL: (u16, u16) = (60, 120);
 
 /// A picture of the swarm, two columns per cell: members as filled arrows (coloured on a terminal),

@@ -8,7 +8,7 @@ use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_controller::{KERNEL_ID, Surprise};
 use minimal_surprise_link::{FIRMWARE_BYTES_MAX, GenomeInUse, Identity, Report, VERSION_BYTES_MAX};
 
-/// Most bits sensed in a step: those of a reading.
+/// Maximum number of bits sensed in a step: those of a reading.
 const BITS_A_STEP_MAX: u64 = u16::BITS as u64;
 /// A container is longer than its CRC.
 const CRC_BYTES: u16 = 4;

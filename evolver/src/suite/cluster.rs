@@ -26,7 +26,7 @@ pub struct Job<'a> {
     pub directory: &'a Path,
     /// Tasks.
     pub shards: u32,
-    /// Most tasks at once.
+    /// Maximum number of tasks at once.
     pub at_once: Option<u32>,
     /// Flags that choose the runs.
     pub flags: Vec<String>,

@@ -68,10 +68,10 @@ pub struct Resilience {
     pub further_runs: u32,
 }
 
-/// Most areas of a resilience: they are called A to Z.
+/// Maximum number of areas of a resilience: they are called A to Z.
 const AREAS_MAX: usize = 26;
 
-/// Most of anything that is counted in a suite, as on the command line.
+/// Maximum of anything that is counted in a suite, as on the command line.
 const COUNT_MAX: u32 = 1_000_000;
 
 fn check_count(key: &str, value: u32) -> Result<(), String> {
@@ -111,7 +111,7 @@ fn check_of(of: &str, names: &[&str]) -> Result<(), String> {
     Err(format!("of = {of:?}: experiments are {}", names.join(", ")))
 }
 
-/// Most combinations of settings of a suite; of each, there may be many runs.
+/// Maximum number of combinations of settings of a suite; of each, there may be many runs.
 const COMBINATIONS_MAX: u64 = 1_000_000;
 
 /// Adds an experiment's combinations to those before it.

@@ -28,7 +28,7 @@ pub struct Plan {
     different: Vec<SeedRange>,
 }
 
-/// Runs under the same settings, with seeds that follow each other.
+/// Runs with the same settings, with seeds that follow each other.
 #[derive(Clone, Copy, Debug)]
 struct SeedRange {
     experiment: u32,
@@ -50,7 +50,7 @@ pub struct PlannedExperiment {
     asked: ExperimentTable,
 }
 
-/// The runs under the same settings.
+/// The runs with the same settings.
 #[derive(Clone, Debug)]
 pub struct PlannedSettings {
     /// What distinguishes them: model, predictions, grid, swarm size, noise.

@@ -34,7 +34,7 @@ pub enum SubmitError {
         said: String,
         /// Tasks asked for.
         shards: u32,
-        /// Most tasks that this cluster takes, where that is known and less.
+        /// Maximum number of tasks that this cluster takes, where that is known and less.
         array_max: Option<u32>,
     },
 }
@@ -110,7 +110,7 @@ fn submit_from(job: &Job<'_>, folder: &Path) -> Result<String, SubmitError> {
     })
 }
 
-/// Most tasks of an array on this cluster: Slurm does not say so when it refuses more.
+/// Maximum number of tasks of an array on this cluster: Slurm does not report it when it refuses more.
 fn array_max() -> Option<u32> {
     let output = Command::new("scontrol").args(["show", "config"]).output();
     let config = String::from_utf8_lossy(&output.ok()?.stdout).into_owned();

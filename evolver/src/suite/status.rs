@@ -59,7 +59,7 @@ impl Hashes {
     }
 }
 
-/// How many runs under the same settings are done.
+/// How many runs with the same settings are done.
 #[derive(Clone, Debug, Default)]
 pub struct Counts {
     /// What distinguishes the settings.

@@ -3,7 +3,7 @@
 //! A panic calls a function that does not exist, so a program that contains a panic cannot be
 //! linked.
 //!
-//! With `unsafe` code: that function must be declared, and a board without a device consists only
+//! Contains `unsafe` code: that function must be declared, and a board without a device consists only
 //! of addresses, whose contents the compiler must not know.
 #![no_std]
 #![allow(unsafe_code)]

@@ -4,7 +4,7 @@
 //! Runs under QEMU with `-icount`. The values depend on the compiler, so there is no file with the
 //! expected output; the test `budget` compares them with `budget.toml`.
 //!
-//! With `unsafe` code: assembler that starts the clock before any other code.
+//! Contains `unsafe` code: assembler that starts the clock before any other code.
 #![no_std]
 #![no_main]
 #![allow(unsafe_code)]

@@ -1,6 +1,6 @@
 //! Stops the wheels in every fault.
 //!
-//! With `unsafe` code: the wheels' registers are addresses.
+//! Contains `unsafe` code: the wheels' registers are addresses.
 #![allow(unsafe_code)]
 
 use core::panic::PanicInfo;

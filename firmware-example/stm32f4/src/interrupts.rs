@@ -1,6 +1,6 @@
 //! Interrupts: bytes arrive, and control periods begin, while the loop runs.
 //!
-//! With `unsafe` code: unmasking interrupts is unsafe. It accesses no memory.
+//! Contains `unsafe` code: unmasking interrupts is unsafe. It accesses no memory.
 #![allow(unsafe_code)]
 
 use core::cell::RefCell;

@@ -18,9 +18,9 @@ use minimal_surprise_sim::damage::Damage;
 use minimal_surprise_sim::{Grid, Heading, Structure};
 use serde_json::{Value, json};
 
-/// Most robot-steps on a page: what browsers open without trouble.
+/// Maximum number of robot-steps on a page: what browsers open without trouble.
 pub const ROBOT_STEPS_MAX: u64 = 20_000_000;
-/// Most cells of a page's torus.
+/// Maximum number of cells of a page's torus.
 pub const CELLS_MAX: u32 = 4_000_000;
 
 /// A recording is too large for a page.

@@ -5,7 +5,7 @@ use super::style::PictureError;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 
-/// Most pixels of a picture, 8000 × 8000.
+/// Maximum number of pixels of a picture, 8000 × 8000.
 const PIXELS_MAX: f64 = 64e6;
 
 /// Millimetres per inch.

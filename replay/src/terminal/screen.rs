@@ -21,10 +21,10 @@ use std::path::Path;
 /// Fewest columns for the details beside the swarm.
 const PANEL: u16 = 34;
 
-/// Most columns for the details.
+/// Maximum number of columns for the details.
 const WIDE_PANEL: u16 = 64;
 
-/// Most rows of details.
+/// Maximum number of rows of details.
 const PANEL_ROWS: u16 = 24;
 
 /// Columns between the swarm and the details.

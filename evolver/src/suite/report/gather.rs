@@ -84,7 +84,7 @@ impl GatheredRun {
     }
 }
 
-/// The finished runs under the same settings.
+/// The finished runs with the same settings.
 #[derive(Clone, Debug)]
 pub struct Group {
     /// The experiment.
@@ -358,7 +358,7 @@ impl Gathered {
             .find(|group| group.experiment == experiment && group.label == label)
     }
 
-    /// The runs beyond the plan under the same settings as those of a group, if there are any.
+    /// The runs beyond the plan with the same settings as those of a group, if there are any.
     #[must_use]
     pub fn further_of(&self, group: &Group) -> Option<&Group> {
         self.further.iter().find(|further| {

@@ -2,7 +2,7 @@
 //! the wheels' registers from outside. Not for a robot: QEMU's chip has neither clock nor timers,
 //! so it can run no other part of the firmware.
 //!
-//! With `unsafe` code: a register is an address.
+//! Contains `unsafe` code: a register is an address.
 #![no_std]
 #![no_main]
 #![allow(unsafe_code)]
