@@ -16,7 +16,7 @@ use tests::noisy_run::copy_noisy_run;
 use tests::program::{Evolver, Finished};
 use tests::tools::require;
 
-/// A folder with short runs in `runs`, given by name.
+/// Creates a folder with the named short runs in `runs`.
 fn with_runs(runs: &[(&str, &str)]) -> Evolver {
     let evolver = Evolver::in_empty_folder();
     fs::create_dir(evolver.folder().join("runs")).unwrap();

@@ -758,7 +758,7 @@ fn short_flags_without(flag: &str) -> Vec<&'static str> {
 fn a_directory_is_a_run_as_soon_as_it_has_its_name() {
     let evolver = Evolver::in_empty_folder();
     let (mut tried, mut resumed) = (0, 0);
-    // A busy machine takes longer to start.
+    // Processes start more slowly on a busy machine.
     while tried < 60 || (resumed == 0 && tried < 2000) {
         let wait_us = 500 * tried;
         tried += 1;
@@ -792,7 +792,7 @@ fn a_report_whose_output_is_closed_ends_quietly() {
         let said = String::from_utf8_lossy(&piped.stderr);
         assert_eq!(said, "code 0\n", "{command}");
     }
-    // Errors are reported nevertheless.
+    // Errors are still reported.
     evolver.run(&short(&["--seed", "1", "--out", "cut"]));
     evolver.write("cut/final.json", b"{");
     let line = format!("{{ {program} gallery . --out pages; echo code $? >&2; }} | sleep 0");

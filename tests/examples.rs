@@ -1,4 +1,4 @@
-//! The examples of the libraries run and show what they claim.
+//! The examples of the libraries run and print the documented results.
 
 use escargot::CargoBuild;
 use std::path::Path;

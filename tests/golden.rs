@@ -1,4 +1,4 @@
-//! Compares ours with the behaviour of the program published by the paper's authors, recorded in
+//! Compares our controller with the program published by the paper's authors, recorded in
 //! `fixtures/golden` (or the folder named by `GOLDEN_DIR`).
 
 use minimal_surprise_controller::{Action, Controller, State};

@@ -363,7 +363,7 @@ fn suite(evolver: &Evolver, runs: u32, robots: u32) {
     evolver.write("large.toml", text.as_bytes());
 }
 
-/// Kilobytes of address space, too few for the large run of a suite.
+/// Limit on the address space in kilobytes, too small for the suite's large run.
 const SHORT: u32 = 300_000;
 /// A suite of one run for which that is too little, although little is computed.
 const ONE_LARGE: &str = "

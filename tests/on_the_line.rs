@@ -440,7 +440,7 @@ fn a_robot_whose_write_count_is_exhausted_says_what_to_do_and_is_restored() {
 fn after_a_refusal_halfway_the_robot_is_restored() {
     let evolver = with_genomes();
     let chunks = evolver.read("new.genome").len().div_ceil(128) as u64;
-    // Request 1 stops, request 2 begins or resets; then follow chunks and the commit, or steps.
+    // Request 1 stops, request 2 begins or resets; the chunks and the commit, or steps, follow.
     let refused = [
         (
             "flash",

@@ -37,7 +37,7 @@ fn message(found: &[(u16, i16)]) -> Vec<u8> {
     message
 }
 
-/// Returns how many scans the bytes complete, and the neighbours after them.
+/// Feeds the bytes; returns the number of completed scans and the resulting neighbours.
 fn feed(bytes: &[u8]) -> (usize, Vec<Detection>) {
     let mut module = RangeBearing::new();
     let mut neighbours = Neighbours::<NEIGHBOURS_MAX>::new();

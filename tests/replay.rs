@@ -254,7 +254,7 @@ fn every_frame_of_a_gif_shows_the_poses_of_its_state() {
     let exported = evolver.run(&words("export run --format trajectory --out trajectory"));
     assert_eq!(exported.code, Some(0), "{exported:?}");
     let trajectory = Trajectory::read(&evolver.text("trajectory")).expect("a trajectory");
-    // The run and its trajectory show the same.
+    // The run and its trajectory produce the same pictures.
     for from in ["run", "trajectory"] {
         replay(
             &evolver,

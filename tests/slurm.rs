@@ -127,7 +127,7 @@ impl Slurm {
     fn hurry(&self, job: &str) {
         for (task, [state, _, reason]) in self.tasks(job) {
             if state == "PENDING" && reason == "BeginTime" {
-                // A node refuses a job within the second in which it ended that job.
+                // A node rejects a job if it ended the same job less than a second ago.
                 std::thread::sleep(Duration::from_secs(3));
                 let task = format!("jobid={job}_{task}");
                 self.ask(&["scontrol", "update", &task, "StartTime=now"]);

@@ -51,7 +51,7 @@ enum Kill {
     After { thousandths: u32 },
 }
 
-/// The bytes, in the file, of the slot being written.
+/// The bytes of the slot being written, within the flash file.
 struct SlotBytes {
     flash: File,
     start: u64,
@@ -241,7 +241,7 @@ fn identify(qemu: &QemuRobot, rng: &mut ChaCha8Rng, running: bool) -> (Line, Gen
     (line, identified.unwrap())
 }
 
-/// Runs `evolver flash` to its end.
+/// Runs `evolver flash` to completion.
 fn flash(evolver: &Evolver, port: &str, container: &[u8]) -> Finished {
     evolver.write("new.genome", container);
     evolver.run(&["flash", "new.genome", "--port", port])

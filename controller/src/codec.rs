@@ -74,7 +74,7 @@ struct Header {
 #[non_exhaustive]
 pub enum DecodeError {
     /// The bytes end before the container does.
-    #[error("too short: {found} bytes of at least {needed}")]
+    #[error("too short: {found} bytes; at least {needed} are needed")]
     TooShort {
         /// Bytes given.
         found: usize,

@@ -881,7 +881,7 @@ fn refuses_the_weight_minus_32768_at_any_index() {
 
 #[test]
 fn errors_are_reported_in_the_order_of_the_format() {
-    // Everything is wrong at first; then one error after another is corrected.
+    // Start with every field invalid, then fix one at a time.
     let right = largest();
     let mut fields = right.clone();
     fields.kernel = [0; 8];

@@ -50,7 +50,7 @@ struct Stored {
     best: Option<Vec<i16>>,
 }
 
-/// The bytes of a checkpoint.
+/// Encodes an experiment as a checkpoint.
 #[must_use]
 pub fn encode(experiment: &Experiment, settings_text: &str) -> Vec<u8> {
     let population = experiment.population();

@@ -46,7 +46,7 @@ pub struct GenerationRecord {
 #[derive(Clone, Debug)]
 pub struct Experiment {
     settings: Settings,
-    /// The generation to evaluate next; after the last one, the last one.
+    /// The next generation to evaluate; once the run is done, the last generation.
     population: Population,
     history: Vec<GenerationRecord>,
     hash: RunHash,

@@ -101,7 +101,7 @@ pub enum ReadRunError {
         /// What is wrong, with line and column.
         error: serde_json::Error,
     },
-    /// The table of the generations is not one.
+    /// The generation table is malformed.
     #[error("{}: {error}", path.display())]
     Generations {
         /// The file.
@@ -117,7 +117,7 @@ pub enum ReadRunError {
         /// The value, and what would be valid.
         problem: String,
     },
-    /// The directory's files do not belong together.
+    /// The files in the directory are inconsistent.
     #[error("{}: {problem}", path.display())]
     Inconsistent {
         /// The directory.
@@ -372,7 +372,7 @@ pub enum Progress {
 ///
 /// # Errors
 /// [`ReadRunError::Damaged`] if it is marked complete, but a file is missing or of another layout,
-/// or the mark is not its hash.
+/// or the completion mark does not contain the hash of the run.
 pub fn complete(path: &Path) -> Result<Option<String>, ReadRunError> {
     if !files::exists(&path.join(DONE))? {
         return Ok(None);

@@ -106,7 +106,7 @@ impl fmt::Display for Holder {
     }
 }
 
-/// The holder of a lock, in words.
+/// Describes the holder of a lock, for messages.
 #[must_use]
 pub fn named(holder: Option<&Holder>) -> String {
     holder.map_or_else(|| "another process".to_owned(), Holder::to_string)

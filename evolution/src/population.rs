@@ -108,7 +108,7 @@ impl Population {
     }
 }
 
-/// The slot with most matches; of equals, the lowest.
+/// Returns the slot with the most matches; ties go to the lowest slot.
 #[must_use]
 pub fn best_slot(matches: &[u64]) -> usize {
     let mut best = 0;

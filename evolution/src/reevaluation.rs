@@ -53,7 +53,7 @@ pub fn rerun(
         .collect()
 }
 
-/// A row of the paper's Tables 7 and 8: one value a repetition in every column.
+/// A row of the paper's Tables 7 and 8: one value per repetition in every column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResilienceRow {
     /// What was done.

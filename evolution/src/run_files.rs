@@ -58,7 +58,7 @@ pub struct Program {
     pub command_line: Vec<String>,
 }
 
-/// `meta.json`: how the run was made.
+/// `meta.json`: provenance of the run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Meta {
     schema_version: u32,

@@ -22,7 +22,7 @@ pub const START: &[u8] = b"minimal surprise steps, version 1";
 /// Which bits of a reading are hashed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Version {
-    /// All sixteen: what runs recorded under `steps_hash`.
+    /// All sixteen bits, as hashed in `steps_hash`.
     V1,
     /// Those of sensors: what runs record under `steps_hash_v2`.
     #[default]

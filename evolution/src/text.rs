@@ -39,7 +39,7 @@ pub fn file_name_except(text: &str, taken: &str) -> String {
     }
 }
 
-/// [`file_name`] that avoids all taken names, even for the same text; adds the name to them.
+/// Like [`file_name`], but returns a name that is not in `taken`, and adds it to `taken`.
 #[must_use]
 pub fn new_file_name(text: &str, taken: &mut BTreeSet<String>) -> String {
     let mut name = file_name(text);

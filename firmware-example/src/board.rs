@@ -11,7 +11,7 @@ use cortex_m as _;
 use cortex_m_semihosting::debug::{EXIT_FAILURE, EXIT_SUCCESS, ExitStatus, exit};
 use defmt_semihosting as _;
 
-/// Ends the emulator with success.
+/// Exits the emulator with a success status.
 pub fn succeed() -> ! {
     end(EXIT_SUCCESS)
 }

@@ -11,7 +11,7 @@
 //! | 2 each | bearing in 1/65536 turn, signed, little-endian; counter-clockwise from straight ahead |
 //!
 //! with the range and the bearing of each neighbour next to each other. A scan without neighbours
-//! is sent too: silence means that the module is broken, and the robot stands.
+//! is sent too: silence means that the module is broken, and the robot stops.
 
 use core::f32::consts::PI;
 use minimal_surprise_controller::neighbours::{Detection, Neighbours};

@@ -57,7 +57,7 @@ pub struct ControllerData {
 /// Where a recording comes from.
 #[derive(Clone, Debug, Default)]
 pub struct Origin {
-    /// Name: a file or directory as the user gave it.
+    /// Path of the file or directory, as given by the user.
     pub name: String,
     /// Seed of the evolution.
     pub seed: Option<u64>,

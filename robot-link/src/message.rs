@@ -59,7 +59,7 @@ pub enum Request<'a> {
         /// At most [`CHUNK_BYTES_MAX`] bytes.
         data: &'a [u8],
     },
-    /// The container is complete: check it, and run it from now on. Answer: [`Reply::Committed`].
+    /// The container is complete: check it and switch to it. Reply: [`Reply::Committed`].
     Commit,
     /// One control step with these readings instead of the robot's own, without moving. Answer:
     /// [`Reply::Stepped`].
@@ -229,7 +229,8 @@ pub struct LineCounters {
     pub malformed: u32,
     /// Frames with a wrong CRC.
     pub bad_crc: u32,
-    /// Bytes between two zero bytes that are not a frame: damaged, truncated or too long.
+    /// Number of byte sequences between two zeros that are not a frame: damaged, truncated or too
+    /// long.
     pub no_frame: u32,
 }
 

@@ -98,7 +98,7 @@ struct Conversation {
     session_before: Option<u32>,
     /// The last request carried out: its number and the CRC of its frame.
     last: (u32, u32),
-    /// The answer to it, as it was sent.
+    /// The reply to the last request, as sent.
     reply: Wire<WIRE_BYTES_MAX>,
     /// The answer to a request of no open session.
     no_session: Wire<24>,

@@ -287,7 +287,7 @@ impl<F: NorFlash> Slots<F> {
     }
 
     /// Begins an update: erases the slot that is not in use and writes the header. `crc` is the
-    /// container's last four bytes, little-endian. An update in progress is dropped.
+    /// container's last four bytes, little-endian. An update in progress is aborted.
     ///
     /// The chip may stall while it erases, for seconds if erase units are large: stop motors first.
     ///
@@ -512,7 +512,7 @@ impl<F: NorFlash> Slots<F> {
     }
 }
 
-/// The genome at `at`, if it can be run and is the one that the header announces.
+/// Returns the genome at `at` if it is valid and its CRC matches the header.
 fn container<'a, F: NorFlash>(
     flash: &'a mut F,
     room: &'a mut impl Room<F>,

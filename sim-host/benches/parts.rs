@@ -1,5 +1,5 @@
 //! The parts of an evaluation, one by one, so that a loss shows where it happened:
-//! `cargo bench -p minimal-surprise-sim`. The whole is measured by `evolver bench`.
+//! `cargo bench -p minimal-surprise-sim`. `evolver bench` measures complete evaluations.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;

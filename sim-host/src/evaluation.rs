@@ -15,7 +15,7 @@ use minimal_surprise_controller::{Controller, Genome};
 pub struct Evaluation {
     /// Matches of the worst repetition.
     pub matches: u64,
-    /// The worst repetition; the first of several.
+    /// The worst repetition; the first if tied.
     pub worst_repetition: u32,
 }
 
@@ -101,7 +101,7 @@ pub fn motion(genome: &Genome, scenario: &Scenario, trial: &Trial) -> (Motion, V
 /// A genome's fitness over all trials.
 ///
 /// # Panics
-/// If there is no trial, or a trial's poses do not fit the grid.
+/// If `trials` is empty, or a trial's poses do not fit the grid.
 #[must_use]
 pub fn evaluate(genome: &Genome, scenario: &Scenario, trials: &[Trial]) -> Evaluation {
     let controller = Controller::new(genome);

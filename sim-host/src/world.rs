@@ -215,7 +215,7 @@ impl World {
         &self.states
     }
 
-    /// What the robots sensed in the last step, noise included; bits beyond the model's sensors are
+    /// The sensor readings of the last step, including noise; bits beyond the model's sensors are
     /// zero.
     #[must_use]
     pub fn readings(&self) -> &[SensorBits] {

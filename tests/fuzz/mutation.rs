@@ -1,4 +1,4 @@
-//! Changes bytes at random, like damaged and hostile files and messages.
+//! Mutates bytes at random to imitate damaged or hostile files and messages.
 
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};

@@ -312,13 +312,13 @@ fn framed(message: &[u8]) -> Vec<u8> {
     wire
 }
 
-/// The answers of a robot to some bytes.
+/// Feeds bytes to a robot and returns its replies.
 fn answers(server: &mut Server, robot: &mut LinkRobot, bytes: &[u8]) -> Vec<Vec<u8>> {
     let answer = |&byte: &u8| server.feed(byte, robot).map(<[u8]>::to_vec);
     bytes.iter().filter_map(answer).collect()
 }
 
-/// The message of a frame.
+/// Decodes a frame and returns its message.
 fn payload(frame: &[u8]) -> Vec<u8> {
     let mut decoder = minimal_surprise_link::Decoder::new();
     let complete = frame.iter().filter(|&&byte| decoder.feed(byte)).count();
@@ -345,7 +345,7 @@ fn link_robot(bytes: &[u8]) -> bool {
             first,
             "a request that arrives twice is answered alike"
         );
-        assert_eq!(robot.done, done, "and carried out once");
+        assert_eq!(robot.done, done, "a repeated request is executed only once");
         for answer in &first {
             decode_reply(&payload(answer)).expect("a reply");
         }

@@ -100,7 +100,7 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
     /// Like [`Self::new`], with these bytes in the first slot.
     ///
     /// # Panics
-    /// If it does not fit.
+    /// If `slot` is longer than a slot.
     #[must_use]
     pub fn with_slot(slot: &[u8]) -> Self {
         let mut words = slot.to_vec();

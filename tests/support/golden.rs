@@ -89,7 +89,7 @@ pub fn directory() -> PathBuf {
     )
 }
 
-/// All recordings, by name.
+/// Reads all recordings; returns them by name.
 ///
 /// # Panics
 /// If the folder or a file in it cannot be read.

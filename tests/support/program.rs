@@ -136,7 +136,7 @@ impl Evolver {
     /// [`Evolver::run`] with an environment variable set.
     ///
     /// # Panics
-    /// If it cannot be started.
+    /// If `evolver` cannot be started.
     pub fn run_with(&self, variable: (&str, &str), arguments: &[impl AsRef<OsStr>]) -> Finished {
         let mut command = self.command(arguments);
         command.env(variable.0, variable.1);
@@ -288,7 +288,7 @@ impl Running {
         assert!(sent.is_ok_and(|status| status.success()), "{command}");
     }
 
-    /// Waits for its end.
+    /// Waits for the process to exit.
     ///
     /// # Panics
     /// If it does not end in time.

@@ -143,7 +143,7 @@ pub struct PluggedRobot {
     pub device: Device,
 }
 
-/// A fault of a line.
+/// A fault on a serial line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// No fault.

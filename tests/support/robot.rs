@@ -30,7 +30,7 @@ impl QemuRobot {
     /// dropped.
     ///
     /// # Errors
-    /// [`Missing`] if there is no QEMU.
+    /// [`Missing`] if QEMU is not installed.
     ///
     /// # Panics
     /// If QEMU does not print the name of the port.

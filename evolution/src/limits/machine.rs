@@ -13,7 +13,7 @@ pub(super) fn memory_available() -> Option<u64> {
     let processes = ProcessesToUpdate::Some(pid.as_slice());
     system.refresh_processes_specifics(processes, false, memory);
     let process = pid.and_then(|pid| system.process(pid));
-    // What a cgroup has cached of files, it can drop.
+    // A cgroup can drop its page cache.
     let cgroup = process
         .and_then(|process| process.cgroup_limits())
         .map(|limits| limits.total_memory.saturating_sub(limits.rss));

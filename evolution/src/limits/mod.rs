@@ -50,7 +50,7 @@ pub struct TooMuch {
 pub enum Place {
     /// In memory.
     Memory,
-    /// On the disk that this directory is on, or will be.
+    /// On the disk that holds, or will hold, this directory.
     Disk(PathBuf),
 }
 

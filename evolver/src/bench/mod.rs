@@ -1,4 +1,4 @@
-//! How fast this program is on this machine, as ratios measured in one run.
+//! Benchmarks, reported as speed ratios within one run.
 //!
 //! Everything is timed on early, middle and late populations of real evolutions ([`populations`]),
 //! in robot-steps per CPU-second on one thread. The baseline is a straightforward floating-point
@@ -137,7 +137,7 @@ fn robot_steps(trials: &TrialSet) -> f64 {
     f64::from(scenario.robots()) * f64::from(scenario.steps()) * trials.trials().len() as f64
 }
 
-/// The floating-point program, in the plain world.
+/// Measures the speed of the floating-point program in the plain world.
 fn f32_speed(genomes: &[Genome], trials: &TrialSet) -> f64 {
     let scenario = trials.scenario();
     let trial = &trials.trials()[0];

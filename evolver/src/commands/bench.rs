@@ -1,4 +1,4 @@
-//! `evolver bench`: how fast this program is on this machine.
+//! `evolver bench`: measures the speed of this program.
 
 use super::BadInput;
 use crate::bench::{self, Report};

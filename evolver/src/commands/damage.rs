@@ -99,7 +99,7 @@ pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Corners of an area.
+/// Parses the corners of an area.
 pub(super) fn corners(text: &str) -> Result<[u32; 4], String> {
     let numbers: Option<Vec<u32>> = text
         .split(',')

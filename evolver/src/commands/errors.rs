@@ -16,7 +16,7 @@ use minimal_surprise_evolution::text::shell_path;
 use minimal_surprise_replay::gallery::GalleryError;
 use std::io::ErrorKind;
 
-/// Input that cannot be used, in one message.
+/// Invalid input, with a message for the user.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct BadInput(String);

@@ -18,7 +18,7 @@ pub struct FlashArgs {
     port: PortArgs,
 }
 
-/// Writes a genome to the robot on a port and starts it.
+/// Writes a genome to the robot on a port and starts the robot.
 ///
 /// # Errors
 /// If the genome cannot be used, there is no such robot, or the robot fails. The robot switches

@@ -20,7 +20,7 @@ fn exists(flag: &str, path: &Path, or_else: &str) -> BadInput {
     ))
 }
 
-/// Writes the file that a flag names.
+/// Writes the file named by a flag.
 pub(super) fn write_file(
     flag: &str,
     path: &Path,

@@ -117,7 +117,7 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<Exit> {
 /// Plays a recording in the terminal until the user or `stop` ends it; returns which of them did.
 ///
 /// # Errors
-/// [`BadInput`] if there is no terminal.
+/// [`BadInput`] if standard output is not a terminal.
 pub(super) fn in_terminal(
     recording: &Recording,
     colouring: Colouring,
@@ -139,11 +139,11 @@ pub(super) fn in_terminal(
 /// Checks that standard output is a terminal that can show a replay.
 pub(super) fn check_terminal() -> Result<(), String> {
     if !io::stdout().is_terminal() {
-        Err("standard output is not a terminal, which the replay needs".to_owned())
+        Err("standard output is not a terminal; `replay` needs one".to_owned())
     } else if !output::terminal_has_codes() {
         let term = env::var_os("TERM").unwrap_or_default();
         Err(format!(
-            "this terminal (TERM={}) cannot show the replay: it only prints lines",
+            "this terminal (TERM={}) cannot show the replay: it cannot move the cursor",
             term.to_string_lossy()
         ))
     } else {

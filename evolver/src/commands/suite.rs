@@ -143,7 +143,7 @@ pub enum ClusterEngine {
     Slurm,
 }
 
-/// What one task of a cluster, or of GNU parallel, does.
+/// Arguments of one cluster or GNU parallel task.
 #[derive(Debug, Args)]
 pub struct TaskArgs {
     /// Which share of the runs: i/n, i from 0.

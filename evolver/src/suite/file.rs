@@ -24,7 +24,7 @@ pub struct Suite {
     /// Its best genomes, run again from new starts.
     #[serde(default, rename = "re-evaluation")]
     pub reevaluations: Vec<Reevaluation>,
-    /// Its structures, damaged.
+    /// Damage experiments on the suite's structures.
     #[serde(default, rename = "resilience")]
     pub resiliences: Vec<Resilience>,
 }

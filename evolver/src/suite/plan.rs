@@ -191,7 +191,7 @@ impl<'a> Runs<'a> {
 }
 
 impl RunsAlike {
-    /// Returns what they share, with the first seed of the experiment.
+    /// Returns the settings that these runs share, with the experiment's first seed.
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings.settings

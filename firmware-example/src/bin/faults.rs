@@ -1,4 +1,4 @@
-//! Turns the wheels (lights on this board) and provokes the fault named on QEMU's command line. The
+//! Turns the wheels (lights on this board) and triggers the fault named on QEMU's command line. The
 //! test `faults` observes the wheels from outside.
 #![no_std]
 #![no_main]

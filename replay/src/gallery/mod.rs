@@ -62,7 +62,7 @@ pub enum GalleryError {
     /// Every run is damaged.
     #[error("{}", causes(.0))]
     Damaged(DamagedRuns),
-    /// The folder exists.
+    /// The folder already exists.
     #[error("{} exists; name another folder, or replace its pages with --overwrite", .0.display())]
     Exists(PathBuf),
     /// The machine has too little memory.

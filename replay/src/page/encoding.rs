@@ -50,7 +50,7 @@ pub struct Layout {
     pub prediction_bytes: usize,
 }
 
-/// The layout, and the text.
+/// Encodes a recording; returns the layout and the encoded text.
 #[must_use]
 pub fn encode(recording: &Recording) -> (Layout, String) {
     let layout = Layout {

@@ -46,7 +46,7 @@ pub enum PageError {
     },
 }
 
-/// Checks that a page can hold this much.
+/// Checks that a recording of this size fits a page.
 ///
 /// # Errors
 /// [`PageError`] if there is too much to show.

@@ -48,7 +48,7 @@ impl Size {
         }
     }
 
-    /// On a screen rounded down to whole pixels.
+    /// Rounds down to whole pixels on a screen; on paper, returns the position unchanged.
     pub(super) fn floor(self, place: f64) -> f64 {
         match self {
             Self::Paper(_) => place,

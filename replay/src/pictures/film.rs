@@ -62,7 +62,7 @@ impl Film<'_> {
         Ok(())
     }
 
-    /// The run as GIF, which restarts at its end.
+    /// Encodes the run as a looping GIF.
     ///
     /// # Errors
     /// [`PictureError`] if the recording lacks what is asked for, or a frame is too large.

@@ -82,7 +82,7 @@ fn cross(drawing: &mut Drawing, (west, north): (f64, f64), side: f64, stroke: St
     drawing.stroked(cross, stroke);
 }
 
-/// The line around the damaged area.
+/// Returns the stroke that outlines the damaged area.
 pub(super) fn area_stroke(drawing: &Drawing, side: f64) -> Stroke<'static> {
     Stroke {
         colour: drawing.theme.expects,

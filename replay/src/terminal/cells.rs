@@ -39,7 +39,7 @@ fn small_arrow(heading: Heading) -> char {
     }
 }
 
-/// Squares are hits, crosses are misses, rings are not sensed yet; filled or thick where there is a
+/// Squares mark hits, crosses misses, rings cells not yet sensed; filled or thick where there is a
 /// robot.
 #[must_use]
 pub fn mark(mark: Mark) -> char {
@@ -53,7 +53,7 @@ pub fn mark(mark: Mark) -> char {
     }
 }
 
-/// A part of a scene as lines, from north to south.
+/// Draws part of a scene as lines of text, from north to south.
 #[must_use]
 pub fn lines(scene: &Scene, x: Range<u16>, y: Range<u16>, paints: Paints) -> Vec<Line<'static>> {
     let width = usize::from(scene.width);

@@ -148,7 +148,7 @@ impl Evaluator {
     /// A genome's fitness over all trials, as returned by [`evaluation::evaluate`].
     ///
     /// # Panics
-    /// If the trials are for another sensor model.
+    /// If the trials are for a different sensor model.
     pub fn evaluate(&mut self, genome: &Genome, trials: &TrialSet) -> Evaluation {
         if self.engine == Engine::Plain {
             return evaluation::evaluate(genome, &trials.scenario, &trials.trials);

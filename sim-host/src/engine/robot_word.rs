@@ -29,7 +29,7 @@ pub(super) fn from_pose(pose: Pose) -> u32 {
     position(pose.x.into(), pose.y.into()) | (pose.heading as u32) << HEADING_SHIFT
 }
 
-/// Returns where a robot is and which way it faces.
+/// Returns the pose stored in a robot word.
 pub(super) fn pose(word: u32) -> Pose {
     Pose {
         x: x(word) as u16,

@@ -160,7 +160,7 @@ struct Groups {
 }
 
 impl Groups {
-    /// Adds a cluster that is connected to no other.
+    /// Adds a cluster that is not connected to any other.
     fn add(&mut self) -> u32 {
         let number = self.parent.len() as u32;
         self.parent.push(number);

@@ -298,7 +298,7 @@ impl Structures {
     }
 
     /// The clusters. Together they are an aggregation, a clustering or a loose grouping, and their
-    /// robots count for that structure.
+    /// robots count towards that structure.
     #[must_use]
     pub fn clusters(&self) -> &Clusters {
         &self.clusters

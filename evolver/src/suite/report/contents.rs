@@ -18,7 +18,7 @@ use std::time::Duration;
 /// Names of a report's other files, without their ends.
 const OTHER_FILES: [&str; 4] = ["report", "runs", "findings", "how-made"];
 
-/// How the runs of a setting were made, the evolved ones or those that were run again.
+/// Provenance of a setting's runs, evolved or re-evaluated.
 #[derive(Clone, Debug, Serialize)]
 pub struct Provenance {
     /// The experiment.

@@ -49,7 +49,7 @@ impl Verdict {
 pub enum Detail {
     /// Nothing that is not said with it.
     None,
-    /// The runs that contradict it.
+    /// The runs that contradict the claim.
     Contradicted(Vec<Contradiction>),
     /// The result for all runs of a damaged structure, in words.
     Damaged(String),
@@ -86,7 +86,7 @@ impl Detail {
     }
 }
 
-/// As it stands in `findings.csv`.
+/// The form written to `findings.csv`.
 impl Serialize for Detail {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&self.in_words(str::to_owned, |run| format!("`{run}`")))

@@ -26,7 +26,7 @@ pub(super) fn p_value(p: f64) -> String {
     }
 }
 
-/// Rows as CSV.
+/// Serializes rows as CSV.
 pub(super) fn csv_text(rows: &[impl Serialize]) -> String {
     let mut table = csv::Writer::from_writer(Vec::new());
     for row in rows {

@@ -247,7 +247,7 @@ impl PaperValues {
             .find(|d| d.of == of && d.experiment == experiment && d.setting == setting)
     }
 
-    /// A single number.
+    /// Looks up one number by experiment, setting and measure.
     #[must_use]
     pub fn number(&self, experiment: &str, setting: &str, measure: &str) -> Option<&Number> {
         self.numbers

@@ -13,7 +13,7 @@ use statrs::function::factorial::ln_factorial;
 const SEED: u64 = 2021;
 /// Resamples of a bootstrap.
 const RESAMPLES: usize = 10_000;
-/// Tables that an exact test looks at; with more, tables are drawn.
+/// Maximum number of tables that an exact test enumerates; above it, tables are sampled at random.
 const EXACT_TABLES_MAX: u64 = 3_000_000;
 /// Tables drawn where there are too many for an exact test.
 const DRAWN_TABLES: u32 = 100_000;
@@ -48,7 +48,7 @@ pub struct Test {
 }
 
 impl Test {
-    /// Returns whether it does not speak against the two being the same.
+    /// Returns true if the test finds no significant difference between the groups.
     #[must_use]
     pub fn compatible(self) -> bool {
         self.p >= SIGNIFICANT
@@ -94,7 +94,7 @@ pub fn median_interval(values: &[f64]) -> Option<Interval> {
     })
 }
 
-/// Quantile of ascending values, linear between them; 0 of nothing.
+/// Returns the quantile of sorted values, linearly interpolated; 0 if there are none.
 #[must_use]
 pub fn quantile(ascending: &[f64], share: f64) -> f64 {
     let Some(last) = ascending.len().checked_sub(1) else {

@@ -274,7 +274,7 @@ fn structure_order(shared: &[Shared<'_>]) -> Vec<String> {
 /// What the percentages of a table are of.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Counted {
-    /// Runs, which structures share.
+    /// Runs; a tied run counts as a fraction for each of its structures.
     TiedRuns,
     /// Runs, and genomes by most of their new starts.
     RunsAndGenomes,
@@ -871,7 +871,7 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
         };
         let grid = damaged.run.finished.settings.scenario().grid();
         notes.push(format!(
-            "{chosen}: {}, seed {}. Means, medians in brackets with their bootstrap 95 % interval.",
+            "{chosen}: {}, seed {}. Means; in brackets, medians with bootstrap 95 % intervals.",
             damaged.label,
             damaged.run.finished.settings.seed()
         ));

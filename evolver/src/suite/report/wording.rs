@@ -108,7 +108,7 @@ pub(super) fn heading(table: &Table) -> String {
     }
 }
 
-/// With a full stop.
+/// Returns the text with a full stop appended.
 pub(super) fn sentence(words: &str) -> String {
     format!("{words}.")
 }

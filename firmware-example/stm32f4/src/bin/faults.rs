@@ -1,4 +1,4 @@
-//! Turns the wheels and provokes the fault named on QEMU's command line. The test `faults` observes
+//! Turns the wheels and triggers the fault named on QEMU's command line. The test `faults` observes
 //! the wheels' registers from outside. Not for a robot: QEMU's chip has neither clock nor timers,
 //! so it can run no other part of the firmware.
 //!

@@ -294,7 +294,7 @@ fn load_two(words: &[u32; LANES], first: usize) -> (__m256i, __m256i) {
 #[inline]
 fn store_two(words: &mut [u32; LANES], first: usize, low: __m256i, high: __m256i) {
     let words = &mut words[first..first + HALF];
-    // SAFETY: 16 words of 32 bits are two registers.
+    // SAFETY: 16 32-bit words fill two registers.
     unsafe {
         let first = words.as_mut_ptr().cast::<__m256i>();
         _mm256_storeu_si256(first, low);

@@ -16,7 +16,7 @@ use core::arch::x86_64::*;
 const Y_SHIFT: u32 = POSITION.trailing_ones() / 2;
 const COORDINATE: i32 = (1 << Y_SHIFT) - 1;
 
-/// Turns the robots that turn and lists those that may move; returns the number of the latter.
+/// Applies all turns and lists the robots that may move; returns the length of the list.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi2,gfni")]
 pub(in super::super) fn sense_and_decide(sensing: Sensing<'_>) -> usize {
     let board = sensing.board;
