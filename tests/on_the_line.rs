@@ -24,7 +24,7 @@ use tests::pty::{Answer, Device, Fault, PluggedRobot};
 /// Longest wait for a command's end.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// A folder with two genomes for this kernel and one for another kernel.
+/// A folder with two genomes for this kernel and one for a different kernel.
 fn with_genomes() -> Evolver {
     let evolver = Evolver::in_empty_folder();
     let topology = Topology::default();

@@ -21,7 +21,7 @@ pub enum CheckpointError {
     /// The file was cut or changed.
     #[error("the checkpoint is damaged: {0}")]
     Damaged(&'static str),
-    /// Written by a program with another layout.
+    /// Written by a program with a different layout.
     #[error("the checkpoint has schema version {found}; this program reads version {SCHEMA}")]
     OtherSchema {
         /// The version found.
@@ -111,7 +111,7 @@ pub fn decode(
         .collect::<Result<_, _>>()?;
     let best = stored.best.as_ref().map(genome).transpose()?;
     if genomes.len() as u64 != u64::from(settings.population()) {
-        return Err(Damaged("the population has another size"));
+        return Err(Damaged("the population has a different size"));
     }
     check(&stored, &settings).map_err(Damaged)?;
     let population = Population::restored(stored.generation, genomes);

@@ -68,7 +68,7 @@ pub enum ReadRunError {
     },
     /// The run is marked complete, and is not.
     #[error(
-        "{error}\nthe run is marked complete, so it was damaged, or made by another version: \
+        "{error}\nthe run is marked complete, so it was damaged, or made by a different version: \
          delete {}, and the command that made it does it again",
         path.display()
     )]
@@ -139,7 +139,7 @@ pub enum StateError {
         /// What is wrong, with line and column.
         error: serde_json::Error,
     },
-    /// It has another layout.
+    /// It has a different layout.
     #[error("{}: schema version {found}; this program reads version {}", path.display(), SCHEMA_VERSION)]
     OtherSchema {
         /// The file.
@@ -371,8 +371,8 @@ pub enum Progress {
 /// The hash of a run, if it is complete, by a quick look at its directory.
 ///
 /// # Errors
-/// [`ReadRunError::Damaged`] if it is marked complete, but a file is missing or of another layout,
-/// or the completion mark does not contain the hash of the run.
+/// [`ReadRunError::Damaged`] if it is marked complete, but a file is missing or has a different
+/// layout, or the completion mark does not contain the hash of the run.
 pub fn complete(path: &Path) -> Result<Option<String>, ReadRunError> {
     if !files::exists(&path.join(DONE))? {
         return Ok(None);

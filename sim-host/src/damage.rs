@@ -112,7 +112,7 @@ impl Damage {
     /// repositioned robots follow them, in index order. Removal draws no random numbers.
     ///
     /// # Errors
-    /// [`DamageError`] if the area is on another grid, the poses do not fit the grid, or there are
+    /// [`DamageError`] if the area is on a different grid, the poses do not fit the grid, or there are
     /// too few free cells for the robots to reposition.
     pub fn apply(
         self,

@@ -82,7 +82,7 @@ pub(super) fn name_damaged(damaged: &DamagedRuns, again: Option<&str>) -> Exit {
         format!("; to do them again, delete {directories}, then: {command}")
     });
     tell!(
-        "{} left out: damaged, made by another version, or not to be read{again}",
+        "{} left out: damaged, made by a different version, or not to be read{again}",
         directories.len()
     );
     Exit::Failure

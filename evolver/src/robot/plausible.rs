@@ -35,7 +35,7 @@ pub(super) fn check_identity(identity: &Identity<'_>) -> Result<(), String> {
     else {
         return Ok(());
     };
-    // The needs of another kernel's genomes are unknown here.
+    // The needs of a different kernel's genomes are unknown here.
     let most = match identity.kernel {
         KERNEL_ID => CONTAINER_BYTES_MAX as u16,
         _ => u16::MAX,

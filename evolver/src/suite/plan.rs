@@ -238,7 +238,7 @@ pub enum PlanError {
 }
 
 impl Plan {
-    /// The runs of a suite, or of one of its experiments, with another number of runs or times as
+    /// The runs of a suite, or of one of its experiments, with a different number of runs or times as
     /// many if asked for. Optional experiments are in only if they are named or all are wanted.
     ///
     /// # Errors

@@ -168,7 +168,7 @@ impl Evaluator {
     /// [`evaluation::motion`]. The fast engine runs only the world, without predictions.
     ///
     /// # Panics
-    /// If the trials are for another sensor model, or there is no such repetition.
+    /// If the trials are for a different sensor model, or there is no such repetition.
     pub fn motion(
         &mut self,
         genome: &Genome,

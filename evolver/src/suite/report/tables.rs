@@ -879,7 +879,7 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
             let grids = if grid.to_string() == DAMAGED_GRID {
                 String::new()
             } else {
-                format!(" and on another grid, {grid} instead of {DAMAGED_GRID}")
+                format!(" and on a different grid, {grid} instead of {DAMAGED_GRID}")
             };
             notes.push(format!(
                 "It is another genome than the paper's{grids}, so that the numbers need not be the \
