@@ -2,10 +2,16 @@
 //!
 //! [`SensorModel::cells`] defines the cells for both the simulator and the robot.
 
+use crate::fixed::MAX_TERMS;
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of sensors of a model (C).
+///
+/// What depends on it asserts it: sums here, the engine's window, draws of noise, hashes of steps.
 pub const MAX_SENSORS: usize = 14;
+
+/// A hidden neuron sums the sensors, the action value and its own last output.
+const _: () = assert!(MAX_SENSORS + 2 <= MAX_TERMS);
 
 /// A cell relative to a robot: steps ahead (negative: behind) and to the left (negative: right).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

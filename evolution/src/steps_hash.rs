@@ -11,10 +11,14 @@
 
 use crate::text::hex;
 use minimal_surprise_controller::SensorModel;
+use minimal_surprise_controller::sensor::MAX_SENSORS;
 use minimal_surprise_sim::noise::NoiseStream;
 use minimal_surprise_sim::{Trial, World};
 use sha2::{Digest, Sha256};
 use std::fmt;
+
+/// A reading is hashed as 16 bits.
+const _: () = assert!(MAX_SENSORS <= u16::BITS as usize);
 
 /// What the chain starts with.
 pub const START: &[u8] = b"minimal surprise steps, version 1";

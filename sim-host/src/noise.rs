@@ -10,10 +10,14 @@
 
 use crate::seed::Stream;
 use minimal_surprise_controller::SensorBits;
+use minimal_surprise_controller::sensor::MAX_SENSORS;
 use rand_core::Rng as _;
 
 /// Number of 32-bit words per robot and step.
 const WORDS_PER_ROBOT: u128 = 8;
+
+/// Every sensor has a draw of its own, of 16 bits.
+const _: () = assert!(MAX_SENSORS as u128 <= 2 * WORDS_PER_ROBOT);
 
 /// Probability that a bit is flipped, in units of 1/65,536.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,11 +6,13 @@
 //! bit of a robot's own cell, which is always occupied, holds the action value instead, so that a
 //! window is the whole input of a network.
 
-use minimal_surprise_controller::sensor::{Cell, SensorModel};
+use minimal_surprise_controller::sensor::{Cell, MAX_SENSORS, SensorModel};
 use minimal_surprise_controller::{Action, SensorBits};
 
 /// Cells of the window, bits of a network's input.
 pub(super) const WINDOW_BITS: usize = 15;
+/// All sensors and the action value have a place.
+const _: () = assert!(MAX_SENSORS < WINDOW_BITS);
 /// Number of different windows.
 pub(super) const WINDOWS: usize = 1 << WINDOW_BITS;
 /// Cells of one row.
