@@ -16,7 +16,7 @@ impl DamagedRuns {
         self.take(run, FinishedRun::read_if_complete(run)).flatten()
     }
 
-    /// Returns what was read of a run, if that went well.
+    /// Returns what was read of a run; if reading failed, adds the run.
     pub fn take<T>(&mut self, run: &Path, read: Result<T, ReadRunError>) -> Option<T> {
         read.map_err(|error| self.add(run, error.cause())).ok()
     }

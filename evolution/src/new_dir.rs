@@ -57,7 +57,7 @@ impl NewDir {
         }
     }
 
-    /// Returns where to write its files.
+    /// Returns the temporary path, where its files are written.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.part
