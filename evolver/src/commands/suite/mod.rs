@@ -1,0 +1,127 @@
+//! `evolver paper` and `evolver suite FILE`: many evolutions, on one machine or many.
+
+mod choice;
+mod plan;
+mod report;
+mod run;
+mod status;
+mod submit;
+
+use crate::commands::BadInput;
+use crate::exit::Exit;
+use crate::suite::{PAPER, Suite};
+use choice::{Choice, Chosen, Source};
+use clap::{Args, Subcommand};
+use minimal_surprise_evolution::files::{self, TEXT_BYTES_MAX};
+use minimal_surprise_evolution::text::shell_path;
+use run::{RunOptions, Share};
+use std::path::{Path, PathBuf};
+
+pub use run::TaskArgs;
+pub use submit::ClusterEngine;
+
+/// A suite in a file.
+#[derive(Debug, Args)]
+pub struct SuiteArgs {
+    /// The suite's TOML file.
+    file: PathBuf,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+/// What to do with a suite.
+#[derive(Debug, Subcommand)]
+pub enum Verb {
+    /// List the runs, without doing any.
+    Plan(Choice),
+    /// Do the runs that are not done; may be interrupted at any moment and called again.
+    Run {
+        /// Which runs.
+        #[command(flatten)]
+        choice: Choice,
+        /// How to work.
+        #[command(flatten)]
+        options: RunOptions,
+    },
+    /// Show how many runs are done; once all are, one hash for all.
+    Status(Choice),
+    /// Write the report: tables, figures and findings, from the runs that are done.
+    Report {
+        /// Which runs.
+        #[command(flatten)]
+        choice: Choice,
+        /// Where to write it.
+        #[command(flatten)]
+        options: report::ReportOptions,
+    },
+    /// Submit the runs to a cluster.
+    Submit {
+        /// Which runs.
+        #[command(flatten)]
+        choice: Choice,
+        /// How to submit them.
+        #[command(flatten)]
+        options: submit::SubmitOptions,
+    },
+}
+
+/// `evolver paper …`
+///
+/// # Errors
+/// [`BadInput`] before anything is written; other errors leave runs that can be resumed.
+pub fn paper(verb: &Verb) -> anyhow::Result<Exit> {
+    let paper = Source {
+        suite: Suite::paper().map_err(BadInput::new)?,
+        built_in: true,
+        text: PAPER.to_owned(),
+        called: "evolver paper".to_owned(),
+    };
+    act(&paper, verb)
+}
+
+/// `evolver suite FILE …`
+///
+/// # Errors
+/// As [`paper`].
+pub fn suite(arguments: &SuiteArgs) -> anyhow::Result<Exit> {
+    act(&read(&arguments.file)?, &arguments.verb)
+}
+
+/// `evolver run-task`
+///
+/// # Errors
+/// As [`paper`].
+pub fn run_task(arguments: &TaskArgs) -> anyhow::Result<Exit> {
+    let share = Share::parse(&arguments.shard)?;
+    let source = read(&arguments.suite)?;
+    let chosen = Chosen::new(&source, &arguments.choice)?;
+    run::run(&chosen, share, &arguments.options)
+}
+
+fn read(file: &Path) -> Result<Source, BadInput> {
+    let text = files::read_text(file, TEXT_BYTES_MAX).map_err(BadInput::new)?;
+    let suite = Suite::parse(file, &text).map_err(BadInput::new)?;
+    let called = format!("evolver suite {}", shell_path(file));
+    Ok(Source {
+        suite,
+        built_in: false,
+        text,
+        called,
+    })
+}
+
+fn act(source: &Source, verb: &Verb) -> anyhow::Result<Exit> {
+    let (Verb::Plan(choice)
+    | Verb::Run { choice, .. }
+    | Verb::Status(choice)
+    | Verb::Report { choice, .. }
+    | Verb::Submit { choice, .. }) = verb;
+    let chosen = Chosen::new(source, choice)?;
+    match verb {
+        Verb::Plan(_) => Ok(plan::print(&chosen)),
+        Verb::Status(_) => status::print(&chosen),
+        Verb::Report { options, .. } => report::write(&chosen, options),
+        Verb::Run { options, .. } => run::run(&chosen, Share::Whole, options),
+        Verb::Submit { options, .. } => submit::submit(&chosen, options),
+    }
+}
