@@ -5,7 +5,7 @@
 use super::recording::Recording;
 use minimal_surprise_controller::SensorBits;
 use minimal_surprise_sim::structures::classify;
-use minimal_surprise_sim::{Pose, Structure};
+use minimal_surprise_sim::{Grid, Pose, Structure};
 use serde::Serialize;
 
 /// What the colours of robots show.
@@ -125,27 +125,40 @@ impl Scene {
         }
     }
 
-    /// A swarm of which only poses are known, such as before damage. Its robots are coloured by
-    /// structure or not at all.
+    /// Creates the scene of a swarm of which only poses are known. Its robots are coloured by whether
+    /// they belong to `structure`, to another structure, or to none.
     #[must_use]
-    pub fn of_poses(recording: &Recording, poses: &[Pose], colouring: Colouring) -> Self {
-        let members = match colouring {
-            Colouring::Structure => classify(recording.grid, poses)
-                .map(|found| found.memberships())
-                .unwrap_or_default(),
-            Colouring::Surprise | Colouring::Plain => Vec::new(),
-        };
-        let robots = poses.iter().enumerate();
-        let robots = robots.map(|(robot, &pose)| {
+    pub fn of_swarm(grid: Grid, poses: &[Pose], structure: Option<Structure>) -> Self {
+        let members = classify(grid, poses).map(|found| found.memberships());
+        let members = members.unwrap_or_default();
+        let robots = poses.iter().enumerate().map(|(robot, &pose)| {
             let ink = members.get(robot).map_or(Ink::Plain, |members| {
-                ink_of_member(|s| members.contains(s), recording.name())
+                ink_of_member(|s| members.contains(s), structure)
             });
             robot_at(pose, ink)
         });
         Self {
+            width: grid.width(),
+            height: grid.height(),
             robots: robots.collect(),
-            ..Self::of(recording, 0, Colouring::Plain, None)
+            marks: Vec::new(),
+            area: Vec::new(),
+            picked: None,
         }
+    }
+
+    /// Creates the scene of the swarm before it was damaged. Its robots are coloured by structure or
+    /// not at all.
+    #[must_use]
+    pub fn before_damage(recording: &Recording, poses: &[Pose], colouring: Colouring) -> Self {
+        let mut scene = Self::of_swarm(recording.grid, poses, recording.name());
+        scene.area = Self::of(recording, 0, Colouring::Plain, None).area;
+        if colouring != Colouring::Structure {
+            for robot in &mut scene.robots {
+                robot.ink = Ink::Plain;
+            }
+        }
+        scene
     }
 }
 

@@ -1,13 +1,13 @@
-//! A value over time, as in the paper's Figs. 5 and 6, with the axes laid out by plotters.
+//! Values over time, as in the paper's Figs. 5 and 6, with the axes laid out by plotters.
 
-use super::drawing::{Anchor, Drawing, Size, Stroke, channels, line};
+use super::drawing::{Anchor, Drawing, Size, Stroke, channels, line, polygon};
 use super::style::{PictureError, named};
 use super::words;
 use crate::palette::Theme;
 use crate::recording::Recording;
 use plotters::prelude::{
-    ChartBuilder, IntoDrawingArea, IntoFont, PathElement, RGBColor, ShapeStyle, TRANSPARENT,
-    TextStyle,
+    ChartBuilder, Color, IntoDrawingArea, IntoFont, PathElement, Polygon, RGBColor, ShapeStyle,
+    TRANSPARENT, TextStyle,
 };
 use plotters_backend::text_anchor::{HPos, VPos};
 use plotters_backend::{
@@ -32,14 +32,13 @@ pub(super) fn temperature(
     theme: &'static Theme,
 ) -> Result<Drawing, PictureError> {
     let most = recording.temperature.iter().copied().fold(0.0, f64::max);
-    let curve = Curve {
-        title: format!("temperature, {}", named(recording)),
-        x: "time step",
-        y: "temperature",
-        values: &recording.temperature,
-        range: (0.0, tenths(most, f64::ceil).max(0.1)),
-    };
-    curve.draw(size, theme)
+    curve(
+        &format!("temperature, {}", named(recording)),
+        ("time step", "temperature"),
+        &recording.temperature,
+        (0.0, tenths(most, f64::ceil).max(0.1)),
+        (size, theme),
+    )
 }
 
 /// Best fitness over the generations.
@@ -55,54 +54,97 @@ pub(super) fn fitness(
     let least = values.iter().copied().fold(1.0, f64::min);
     let most = values.iter().copied().fold(0.0, f64::max);
     let least = tenths(least, f64::floor);
-    let curve = Curve {
-        title: format!("best fitness, {}", named(recording)),
-        x: "generation",
-        y: "best fitness",
+    curve(
+        &format!("best fitness, {}", named(recording)),
+        ("generation", "best fitness"),
         values,
-        range: (least, tenths(most, f64::ceil).max(least + 0.1)),
-    };
-    curve.draw(size, theme)
+        (least, tenths(most, f64::ceil).max(least + 0.1)),
+        (size, theme),
+    )
 }
 
 fn tenths(value: f64, to: fn(f64) -> f64) -> f64 {
     to(value * 10.0) / 10.0
 }
 
-struct Curve<'a> {
-    title: String,
-    x: &'static str,
-    y: &'static str,
-    values: &'a [f64],
-    range: (f64, f64),
+/// Values over steps or generations: a line, on bands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chart {
+    /// Label of the horizontal axis.
+    pub x: &'static str,
+    /// Label of the vertical axis.
+    pub y: &'static str,
+    /// Least and greatest *x*.
+    pub x_range: (f64, f64),
+    /// Least and greatest *y*.
+    pub y_range: (f64, f64),
+    /// Decimals of the numbers on the vertical axis.
+    pub decimals: usize,
+    /// Areas between two lines, translucent: (*x*, lower *y*, upper *y*) in ascending *x*.
+    pub bands: Vec<Vec<(f64, f64, f64)>>,
+    /// The line, in ascending *x*.
+    pub line: Vec<(f64, f64)>,
 }
 
-impl Curve<'_> {
-    fn draw(&self, size: Size, theme: &'static Theme) -> Result<Drawing, PictureError> {
+/// Draws one line, from *x* = 0, as a picture.
+fn curve(
+    title: &str,
+    (x, y): (&'static str, &'static str),
+    values: &[f64],
+    y_range: (f64, f64),
+    (size, theme): (Size, &'static Theme),
+) -> Result<Drawing, PictureError> {
+    let values = values.iter().enumerate();
+    let chart = Chart {
+        x,
+        y,
+        x_range: (0.0, values.len() as f64),
+        y_range,
+        decimals: 1,
+        bands: Vec::new(),
+        line: values.map(|(at, &value)| (at as f64, value)).collect(),
+    };
+    let mut drawing = Drawing::new(size, theme, title);
+    let (width, height) = chart.extent(size);
+    drawing.set_size(width, height);
+    chart.draw(&mut drawing, (0.0, 0.0))?;
+    Ok(drawing)
+}
+
+impl Chart {
+    /// Returns the width and height of a chart in a picture of this size.
+    pub(super) fn extent(&self, size: Size) -> (f64, f64) {
         let width = match size {
             Size::Paper(width) => width,
             Size::Screen(_) => SCREEN_WIDTH,
         };
-        let height = size.whole(width * SHAPE);
-        let mut drawing = Drawing::new(size, theme, &self.title);
-        drawing.set_size(width, height);
-        self.onto(&mut drawing, (width, height))
-            .map_err(|error| PictureError::Encoding(error.to_string()))?;
-        Ok(drawing)
+        (width, size.whole(width * SHAPE))
     }
 
-    fn onto(
+    /// Draws the chart from its north-west corner.
+    pub(super) fn draw(
         &self,
         drawing: &mut Drawing,
-        (width, height): (f64, f64),
+        corner: (f64, f64),
+    ) -> Result<(), PictureError> {
+        self.plot(drawing, corner)
+            .map_err(|error| PictureError::Encoding(error.to_string()))
+    }
+
+    fn plot(
+        &self,
+        drawing: &mut Drawing,
+        corner: (f64, f64),
     ) -> Result<(), Box<dyn std::error::Error>> {
         let theme = drawing.theme;
         let size = drawing.size;
         let fine = |length: f64| (length * FINE).round() as u32;
         let words = size.words();
+        let (width, height) = self.extent(size);
         let [text, soft, line, curve] = [theme.text, theme.soft, theme.line, theme.named].map(rgb);
         let area = Plot {
             drawing,
+            corner,
             size: (fine(width), fine(height)),
         }
         .into_drawing_area();
@@ -115,7 +157,10 @@ impl Curve<'_> {
             .margin_left(fine(0.3 * words))
             .x_label_area_size(fine(3.0 * words))
             .y_label_area_size(fine(4.2 * words))
-            .build_cartesian_2d(0..self.values.len(), self.range.0..self.range.1)?;
+            .build_cartesian_2d(
+                self.x_range.0..self.x_range.1,
+                self.y_range.0..self.y_range.1,
+            )?;
         let hair = |colour: RGBColor, times: f64| {
             ShapeStyle::from(&colour).stroke_width(fine(times * size.hair()))
         };
@@ -126,15 +171,21 @@ impl Curve<'_> {
             .x_labels(6)
             .y_labels(6)
             .set_all_tick_mark_size(fine(0.4 * words))
-            .y_label_formatter(&|value| format!("{value:.1}"))
+            .x_label_formatter(&|value| format!("{value:.0}"))
+            .y_label_formatter(&|value| format!("{value:.*}", self.decimals))
             .label_style(style.color(&soft))
             .axis_desc_style(style.color(&text))
             .axis_style(hair(soft, 1.5))
             .bold_line_style(hair(line, 1.0))
             .light_line_style(TRANSPARENT)
             .draw()?;
-        let points: Vec<_> = self.values.iter().copied().enumerate().collect();
-        chart.draw_series([PathElement::new(points, hair(curve, 2.0))])?;
+        let bands = self.bands.iter().map(|band| {
+            let lower = band.iter().map(|&(x, low, _)| (x, low));
+            let upper = band.iter().rev().map(|&(x, _, high)| (x, high));
+            Polygon::new(lower.chain(upper).collect::<Vec<_>>(), curve.filled())
+        });
+        chart.draw_series(bands)?;
+        chart.draw_series([PathElement::new(self.line.clone(), hair(curve, 2.0))])?;
         area.present()?;
         Ok(())
     }
@@ -143,12 +194,15 @@ impl Curve<'_> {
 /// A drawing as a back end of plotters.
 struct Plot<'a> {
     drawing: &'a mut Drawing,
+    /// North-west corner in the drawing.
+    corner: (f64, f64),
     size: (u32, u32),
 }
 
 impl Plot<'_> {
     fn at(&self, (x, y): BackendCoord) -> (f64, f64) {
-        (f64::from(x) / FINE, f64::from(y) / FINE)
+        let (west, north) = self.corner;
+        (west + f64::from(x) / FINE, north + f64::from(y) / FINE)
     }
 
     fn points(&mut self, points: &[BackendCoord], style: &impl BackendStyle) {
@@ -166,7 +220,7 @@ impl Plot<'_> {
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
-/// Curves consist of lines and text only.
+/// Charts consist of lines, areas and text only.
 impl DrawingBackend for Plot<'_> {
     type ErrorType = Infallible;
 
@@ -203,6 +257,17 @@ impl DrawingBackend for Plot<'_> {
         style: &S,
     ) -> Drawn {
         self.points(&path.into_iter().collect::<Vec<_>>(), style);
+        Ok(())
+    }
+
+    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        corners: I,
+        style: &S,
+    ) -> Drawn {
+        let corners: Vec<(f64, f64)> = corners.into_iter().map(|corner| self.at(corner)).collect();
+        let colour = hexadecimal(style.color());
+        self.drawing.tinted(polygon(&corners), &colour);
         Ok(())
     }
 

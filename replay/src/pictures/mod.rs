@@ -1,7 +1,7 @@
 //! Pictures of a run: stills as SVG and PNG, animations as GIF and MP4.
 //!
-//! [`still`] turns a scene or a curve into a [`Drawing`]; [`raster`] turns its SVG into pixels;
-//! [`film`] turns many of these into an animation.
+//! [`still`] turns a scene or a curve into a [`Drawing`], [`sheet()`] several of them; [`raster`] turns
+//! its SVG into pixels; [`film`] turns many of these into an animation.
 
 mod curves;
 mod drawing;
@@ -9,12 +9,15 @@ pub mod film;
 mod legend;
 mod predictions;
 pub mod raster;
+mod sheet;
 mod state;
 mod style;
 mod symbols;
 mod words;
 
+pub use curves::Chart;
 pub use drawing::{Drawing, Size};
+pub use sheet::{Content, Panel, sheet};
 pub use style::{PictureError, Style};
 
 use super::recording::Recording;

@@ -7,14 +7,16 @@ use super::words;
 use crate::palette::Theme;
 use crate::recording::Recording;
 use crate::scene::Ink;
+use minimal_surprise_controller::SensorModel;
 
 /// Widest cell, in text heights: it has room for a number with two decimals.
-const CELL_MAX: f64 = 4.5;
+pub(super) const CELL_MAX: f64 = 4.5;
 
 /// The average prediction in every sensor's cell; the robot faces up.
 ///
 /// # Errors
-/// [`PictureError::NoController`] of a trajectory.
+/// [`PictureError::NoController`] of a trajectory; [`PictureError::TooNarrow`] if the title does
+/// not fit.
 pub(super) fn predictions(
     recording: &Recording,
     size: Size,
@@ -26,19 +28,11 @@ pub(super) fn predictions(
         .ok_or(PictureError::NoController)?;
     let words = size.words();
     let margin = size.margin();
-    let cells = controller.topology.model().cells();
-    // The robot is one of the cells shown.
-    let sides = |of_cells: Vec<i8>| {
-        let least = of_cells
-            .iter()
-            .fold(0, |least: i8, &value| least.min(value));
-        let most = of_cells.iter().fold(0, |most: i8, &value| most.max(value));
-        (f64::from(least), f64::from(most))
+    let surroundings = Surroundings {
+        model: controller.topology.model(),
+        averages: &controller.average_prediction,
     };
-    let (behind, ahead) = sides(cells.iter().map(|cell| cell.ahead).collect());
-    let (right, left) = sides(cells.iter().map(|cell| cell.left).collect());
-    let columns = left - right + 1.0;
-    let rows = ahead - behind + 1.0;
+    let (columns, rows) = surroundings.cells();
     let title = format!("average predictions, {}", named(recording));
     let needed = words::width(&title, words) + 2.0 * margin;
     let width = match size {
@@ -55,35 +49,68 @@ pub(super) fn predictions(
     drawing.set_size(width, header + rows * side + margin);
     let above = (width / 2.0, header / 2.0);
     drawing.words(&title, Anchor::Middle, above, theme.text);
-    // The north-west corner of a cell relative to the robot.
-    let corner = |cell_ahead: f64, cell_left: f64| {
-        (
-            width / 2.0 + ((left + right) / 2.0 - cell_left - 0.5) * side,
-            header + (ahead - cell_ahead) * side,
-        )
-    };
-    for (cell, &average) in cells.iter().zip(&controller.average_prediction) {
-        let (x, y) = corner(f64::from(cell.ahead), f64::from(cell.left));
-        let fill = mixed(theme.cell, theme.named, average);
-        drawing.area((x, y), (side, side), fill);
-        let outline = square((x, y), side, 0.0);
-        drawing.stroked(
-            outline,
-            Stroke {
-                colour: theme.line,
-                width: size.hair(),
-            },
-        );
-        let colour = if average > 0.5 {
-            theme.ground
-        } else {
-            theme.text
-        };
-        let middle = (x + side / 2.0, y + side / 2.0);
-        drawing.words(&format!("{average:.2}"), Anchor::Middle, middle, colour);
-    }
-    arrow(&mut drawing, corner(0.0, 0.0), side, 1, Ink::Plain);
+    surroundings.draw(&mut drawing, ((width - columns * side) / 2.0, header), side);
     Ok(drawing)
+}
+
+/// The sensor cells around a robot, with the average prediction of each.
+pub(super) struct Surroundings<'a> {
+    pub(super) model: SensorModel,
+    pub(super) averages: &'a [f64],
+}
+
+impl Surroundings<'_> {
+    /// Returns the foremost and the leftmost position, then the rearmost and the rightmost one;
+    /// the robot, at (0, 0), is one of the cells shown.
+    fn bounds(&self) -> [(f64, f64); 2] {
+        let bound = |choose: fn(i8, i8) -> i8| {
+            let cells = self.model.cells().iter();
+            let (ahead, left) = cells.fold((0, 0), |(ahead, left), cell| {
+                (choose(ahead, cell.ahead), choose(left, cell.left))
+            });
+            (f64::from(ahead), f64::from(left))
+        };
+        [bound(i8::max), bound(i8::min)]
+    }
+
+    /// Returns the number of columns and rows.
+    pub(super) fn cells(&self) -> (f64, f64) {
+        let [(ahead, left), (behind, right)] = self.bounds();
+        (left - right + 1.0, ahead - behind + 1.0)
+    }
+
+    /// Draws the cells from their north-west corner.
+    pub(super) fn draw(&self, drawing: &mut Drawing, (west, north): (f64, f64), side: f64) {
+        let theme = drawing.theme;
+        let [(most_ahead, most_left), _] = self.bounds();
+        let corner = |ahead: f64, left: f64| {
+            (
+                west + (most_left - left) * side,
+                north + (most_ahead - ahead) * side,
+            )
+        };
+        for (cell, &average) in self.model.cells().iter().zip(self.averages) {
+            let (x, y) = corner(f64::from(cell.ahead), f64::from(cell.left));
+            let fill = mixed(theme.cell, theme.named, average);
+            drawing.area((x, y), (side, side), fill);
+            let outline = square((x, y), side, 0.0);
+            drawing.stroked(
+                outline,
+                Stroke {
+                    colour: theme.line,
+                    width: drawing.size.hair(),
+                },
+            );
+            let colour = if average > 0.5 {
+                theme.ground
+            } else {
+                theme.text
+            };
+            let middle = (x + side / 2.0, y + side / 2.0);
+            drawing.words(&format!("{average:.2}"), Anchor::Middle, middle, colour);
+        }
+        arrow(drawing, corner(0.0, 0.0), side, 1, Ink::Plain);
+    }
 }
 
 /// A colour between two others, as `#rrggbb`.

@@ -103,7 +103,7 @@ pub(super) fn damage(
         .as_ref()
         .ok_or(PictureError::NoDamage)?;
     let scenes = [
-        Scene::of_poses(recording, &damaged.before, style.colouring),
+        Scene::before_damage(recording, &damaged.before, style.colouring),
         scene(recording, t, style)?,
     ];
     let legend = Legend::of(&scenes, style.colouring, recording);
@@ -242,7 +242,8 @@ fn panels(
     Ok(drawing)
 }
 
-fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f64), side: f64) {
+/// Draws a swarm from the north-west corner of its grid.
+pub(super) fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f64), side: f64) {
     let theme = drawing.theme;
     let hair = drawing.size.hair();
     let (width, height) = (f64::from(scene.width), f64::from(scene.height));

@@ -62,7 +62,7 @@ impl<'a> Player<'a> {
     pub fn scene(&self) -> Scene {
         match &self.recording.origin.damage {
             Some(damage) if self.before => {
-                Scene::of_poses(self.recording, &damage.before, self.colouring)
+                Scene::before_damage(self.recording, &damage.before, self.colouring)
             }
             _ => Scene::of(self.recording, self.t, self.colouring, self.picked),
         }

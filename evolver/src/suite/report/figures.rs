@@ -1,20 +1,14 @@
 //! The paper's figures as SVG, each with its data as CSV.
-//!
-//! In the report's page lines and letters have the colour of its text, so that a figure can be read
-//! on a light and on a dark page; a file of its own is dark on white.
 
 use super::gather::{Gathered, GatheredRun, Group, Resilient};
 use super::numbers::{csv_text, plural};
 use super::paper::PaperValues;
 use super::statistics::quantile;
-use minimal_surprise_sim::structures::{LineOrientation, Structure, classify};
-use minimal_surprise_sim::{Grid, Heading, Pose};
-use plotters::coord::Shift;
-use plotters::element::{Drawable, PointCollection};
-use plotters::prelude::{
-    ChartBuilder, Color, DrawingArea, IntoDrawingArea, IntoDynElement, PathElement, Polygon,
-    RGBColor, Rectangle, SVGBackend, Text,
-};
+use minimal_surprise_replay::palette::LIGHT;
+use minimal_surprise_replay::pictures::{Chart, Content, Panel, PictureError, sheet};
+use minimal_surprise_replay::scene::{Ink, Scene};
+use minimal_surprise_sim::structures::{LineOrientation, Structure};
+use minimal_surprise_sim::{Grid, Pose};
 use serde::Serialize;
 
 /// A figure.
@@ -75,33 +69,19 @@ const fn states_of(figure: u32, experiment: &'static str, label: &'static str, b
     }
 }
 
-impl Figure {
-    /// The picture as a file of its own: dark on white, whatever the page that shows it is like.
-    #[must_use]
-    pub fn standalone(&self) -> String {
-        let ground = "><rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>";
-        let on_ground = self.svg.replacen('>', ground, 1);
-        on_ground.replace("currentColor", "#000000")
-    }
-}
-
-/// A figure cannot be drawn.
+/// A figure could not be drawn.
 #[derive(Debug, thiserror::Error)]
-#[error("figure {id}: {problem}")]
+#[error("figure {id}")]
 pub struct FigureError {
     id: String,
-    problem: String,
+    #[source]
+    source: PictureError,
 }
 
-const MEMBER: RGBColor = RGBColor(31, 119, 180);
-const OTHER: RGBColor = RGBColor(140, 140, 140);
-const MEDIAN: RGBColor = RGBColor(214, 39, 40);
-const FONT: &str = "sans-serif";
-
-/// All figures.
+/// Draws all figures.
 ///
 /// # Errors
-/// [`FigureError`] names the figure.
+/// [`FigureError`] if a figure cannot be drawn.
 pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, FigureError> {
     let is_paper = !paper.distributions.is_empty();
     let mut figures = Vec::new();
@@ -136,8 +116,8 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
             name(
                 5,
                 "temperature",
-                "Temperature over time: box plots at every even step, drawn as \
-                 bands; extremes light, quartiles dark, medians red",
+                "Temperature over time: medians, with bands of quartiles and extremes, at every \
+                 even step",
             ),
             &groups,
         )?);
@@ -145,7 +125,7 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
             name(
                 6,
                 "best",
-                "Best fitness over generations; medians red, bands of quartiles and extremes grey",
+                "Best fitness over generations: medians, with bands of quartiles and extremes",
             ),
             &groups,
         )?);
@@ -201,7 +181,7 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
 }
 
 /// Marks a run beyond the plan.
-const BEYOND_PLAN: &str = "†";
+const BEYOND_PLAN: &str = "*";
 
 /// What a figure is called.
 struct Name {
@@ -219,14 +199,23 @@ impl Name {
         self
     }
 
-    fn figure(self, svg: String, csv: String) -> Figure {
+    /// Draws panels as a figure, `columns` per row.
+    fn figure(
+        self,
+        panels: &[Panel<'_>],
+        columns: usize,
+        rows: &[impl Serialize],
+    ) -> Result<Figure, FigureError> {
         let Self { id, number, title } = self;
-        Figure {
-            id,
-            number,
-            title,
-            svg,
-            csv,
+        match sheet(&title, panels, columns, &LIGHT) {
+            Ok(drawing) => Ok(Figure {
+                id,
+                number,
+                title,
+                svg: drawing.svg(),
+                csv: csv_text(rows),
+            }),
+            Err(source) => Err(FigureError { id, source }),
         }
     }
 }
@@ -319,7 +308,10 @@ fn final_states(
         })
         .collect();
     let name = name.explained(has_mark);
-    let title = format!("{}; robots in the structure are blue", name.title);
+    let title = format!(
+        "{}; robots in the structure are blue, those in another structure orange, the others hollow",
+        name.title
+    );
     draw_states(Name { title, ..name }, &states, 3)
 }
 
@@ -345,7 +337,7 @@ fn damage(prefix: &str, resilient: &Resilient) -> Result<Option<Figure>, FigureE
         }
     }
     let title = format!(
-        "{prefix}removal of robots from {} of a {} on {grid}; robots in the structure are blue",
+        "{prefix}removal of robots from {} of a {} on {grid}; robots in the structure are blue, those in another structure orange, the others hollow",
         plural(damaged.areas.len(), "area"),
         resilient.structure
     );
@@ -356,9 +348,6 @@ fn damage(prefix: &str, resilient: &Resilient) -> Result<Option<Figure>, FigureE
     };
     draw_states(name, &states, damaged.areas.len()).map(Some)
 }
-
-const CELL: i32 = 12;
-const GAP: i32 = 22;
 
 #[derive(Serialize)]
 struct RobotRow<'a> {
@@ -372,82 +361,29 @@ struct RobotRow<'a> {
 
 fn draw_states(name: Name, states: &[State<'_>], columns: usize) -> Result<Figure, FigureError> {
     let mut rows = Vec::new();
-    let side = |cells: u16| i32::from(cells) * CELL;
-    let panel_width = states
-        .iter()
-        .map(|s| side(s.grid.width()))
-        .max()
-        .unwrap_or(0)
-        .max(180)
-        + GAP;
-    let panel_height = states
-        .iter()
-        .map(|s| side(s.grid.height()))
-        .max()
-        .unwrap_or(0)
-        + 2 * GAP;
-    let columns = columns.clamp(1, states.len().max(1));
-    let lines = states.len().div_ceil(columns).max(1);
-    let size = (
-        panel_width * columns as i32 + GAP,
-        panel_height * lines as i32,
-    );
-    let svg = draw(&name.id, size, |area| {
-        for (index, state) in states.iter().enumerate() {
-            let west = GAP / 2 + panel_width * (index % columns) as i32;
-            let top = panel_height * (index / columns) as i32 + GAP;
-            let found = classify(state.grid, state.poses).map_err(|error| error.to_string())?;
-            text(area, &state.title, (west, top - 18), 14)?;
-            let (width, height) = (side(state.grid.width()), side(state.grid.height()));
-            let frame = [(west, top), (west + width, top + height)];
-            put(area, Rectangle::new(frame, OTHER.stroke_width(1)))?;
-            for (robot, pose) in state.poses.iter().enumerate() {
-                let member = found.contains(state.structure, robot as u32);
-                let x = west + i32::from(pose.x) * CELL + CELL / 2;
-                let y = top + height - i32::from(pose.y) * CELL - CELL / 2;
-                let colour = if member { MEMBER } else { OTHER };
-                put(
-                    area,
-                    Polygon::new(
-                        triangle((x, y), pose.heading, CELL / 2 - 1),
-                        colour.filled(),
-                    ),
-                )?;
-                rows.push(RobotRow {
-                    state: &state.title,
-                    robot,
-                    x: pose.x,
-                    y: pose.y,
-                    heading: pose.heading.into(),
-                    in_structure: member.into(),
-                });
-            }
-            if let Some(cells) = state.area {
-                let corner =
-                    |x: u32, y: u32| (west + x as i32 * CELL, top + height - y as i32 * CELL);
-                let frame = [
-                    corner(cells.x0, cells.y1 + 1),
-                    corner(cells.x1 + 1, cells.y0),
-                ];
-                put(area, Rectangle::new(frame, MEDIAN.stroke_width(2)))?;
-            }
+    let mut panels = Vec::new();
+    for state in states {
+        let mut scene = Scene::of_swarm(state.grid, state.poses, Some(state.structure));
+        if let Some(area) = state.area {
+            let cells = (area.y0..=area.y1).flat_map(|y| (area.x0..=area.x1).map(move |x| [x, y]));
+            scene.area = cells.map(|cell| cell.map(|at| at as u16)).collect();
         }
-        Ok(())
-    })?;
-    Ok(name.figure(svg, csv_of(&rows)))
-}
-
-/// A robot's triangle, its tip ahead.
-fn triangle(middle: (i32, i32), heading: Heading, half: i32) -> Vec<(i32, i32)> {
-    let (ahead_x, ahead_y) = heading.ahead();
-    // On the screen y grows down.
-    let at = |ahead: i32, left: i32| {
-        (
-            middle.0 + ahead * ahead_x - left * ahead_y,
-            middle.1 - ahead * ahead_y - left * ahead_x,
-        )
-    };
-    vec![at(half, 0), at(-half, half), at(-half, -half)]
+        for (robot, drawn) in scene.robots.iter().enumerate() {
+            rows.push(RobotRow {
+                state: &state.title,
+                robot,
+                x: drawn.x,
+                y: drawn.y,
+                heading: drawn.heading,
+                in_structure: (drawn.ink == Ink::Named).into(),
+            });
+        }
+        panels.push(Panel {
+            title: state.title.clone(),
+            content: Content::Swarm(scene),
+        });
+    }
+    name.figure(&panels, columns, &rows)
 }
 
 #[derive(Serialize)]
@@ -460,8 +396,6 @@ struct PredictionRow<'a> {
 }
 
 fn predictions(name: Name, groups: &[&Group], gathered: &Gathered) -> Result<Figure, FigureError> {
-    const SIDE: i32 = 40;
-    const PANEL: i32 = 250;
     let shown: Vec<(bool, String, &Group, &GatheredRun)> = groups
         .iter()
         .flat_map(|group| {
@@ -478,56 +412,29 @@ fn predictions(name: Name, groups: &[&Group], gathered: &Gathered) -> Result<Fig
         .collect();
     let name = name.explained(shown.iter().any(|(is_beyond_plan, ..)| *is_beyond_plan));
     let mut rows = Vec::new();
-    let columns = shown.len().clamp(1, 4) as i32;
-    let lines = (shown.len() as i32 + columns - 1) / columns;
-    let svg = draw(
-        &name.id,
-        (PANEL * columns, (PANEL + GAP) * lines.max(1)),
-        |area| {
-            for (index, (_, shown, group, run)) in shown.iter().enumerate() {
-                let middle_x = PANEL * (index as i32 % columns) + PANEL / 2;
-                let middle_y = (PANEL + GAP) * (index as i32 / columns) + GAP + PANEL / 2;
-                text(
-                    area,
-                    shown,
-                    (middle_x - 3 * SIDE + 20, middle_y - PANEL / 2 - 12),
-                    14,
-                )?;
-                let robot = triangle((middle_x, middle_y), Heading::North, SIDE / 3);
-                put(area, Polygon::new(robot, OTHER.filled()))?;
-                let cells = group.settings.topology().model().cells();
-                for (sensor, (cell, &average)) in cells
-                    .iter()
-                    .zip(&run.finished.average_prediction)
-                    .enumerate()
-                {
-                    let x = middle_x - i32::from(cell.left) * SIDE;
-                    let y = middle_y - i32::from(cell.ahead) * SIDE;
-                    let half = SIDE / 2 - 1;
-                    let corners = [(x - half, y - half), (x + half, y + half)];
-                    put(
-                        area,
-                        Rectangle::new(corners, MEMBER.mix(0.7 * average).filled()),
-                    )?;
-                    put(area, Rectangle::new(corners, OTHER.stroke_width(1)))?;
-                    text(area, &format!("{average:.2}"), (x - 13, y - 7), 13)?;
-                    rows.push(PredictionRow {
-                        state: shown,
-                        sensor,
-                        ahead: cell.ahead,
-                        left: cell.left,
-                        average_prediction: average,
-                    });
-                }
-            }
-            Ok(())
-        },
-    )?;
-    Ok(name.figure(svg, csv_of(&rows)))
+    let mut panels = Vec::new();
+    for (_, title, group, run) in &shown {
+        let model = group.settings.topology().model();
+        let averages = &run.finished.average_prediction;
+        for (sensor, (cell, &average)) in model.cells().iter().zip(averages).enumerate() {
+            rows.push(PredictionRow {
+                state: title,
+                sensor,
+                ahead: cell.ahead,
+                left: cell.left,
+                average_prediction: average,
+            });
+        }
+        panels.push(Panel {
+            title: title.clone(),
+            content: Content::Predictions { model, averages },
+        });
+    }
+    name.figure(&panels, 4, &rows)
 }
 
 /// Runs whose values are shown together over time.
-struct Panel {
+struct Values {
     title: String,
     /// Of each run, its values.
     runs: Vec<Vec<f64>>,
@@ -537,7 +444,7 @@ struct Panel {
 
 fn temperature(name: Name, groups: &[&Group]) -> Result<Figure, FigureError> {
     let mut panels = Vec::new();
-    let panel = |title: String, group: &Group, is: &dyn Fn(&GatheredRun) -> bool| Panel {
+    let panel = |title: String, group: &Group, is: &dyn Fn(&GatheredRun) -> bool| Values {
         title,
         runs: group
             .runs
@@ -569,9 +476,9 @@ fn temperature(name: Name, groups: &[&Group]) -> Result<Figure, FigureError> {
 }
 
 fn best_fitness(name: Name, groups: &[&Group]) -> Result<Figure, FigureError> {
-    let panels: Vec<Panel> = groups
+    let panels: Vec<Values> = groups
         .iter()
-        .map(|group| Panel {
+        .map(|group| Values {
             title: group.label.clone(),
             runs: group
                 .runs
@@ -599,126 +506,69 @@ struct BandRow<'a> {
 /// Medians with bands from quartile to quartile and from the least to the largest value.
 fn bands(
     name: Name,
-    (x_name, y_name): (&str, &str),
-    panels: &[Panel],
+    (x, y): (&'static str, &'static str),
+    values: &[Values],
 ) -> Result<Figure, FigureError> {
-    const WIDTH: i32 = 620;
-    const HEIGHT: i32 = 300;
-    let columns = panels.len().clamp(1, 2);
-    let lines = panels.len().div_ceil(columns).max(1);
-    let values = panels
+    let all = values
         .iter()
-        .flat_map(|panel| panel.runs.iter().flatten().copied());
-    let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), value| {
+        .flat_map(|values| values.runs.iter().flatten());
+    let (low, high) = all.fold((f64::MAX, f64::MIN), |(low, high), &value| {
         (low.min(value), high.max(value))
     });
-    let (low, high) = if low < high {
+    let y_range = if low < high {
         (low, high)
     } else {
         (low - 0.5, low + 0.5)
     };
     let mut rows = Vec::new();
-    let size = (WIDTH * columns as i32, HEIGHT * lines as i32);
-    let svg = draw(&name.id, size, |root| {
-        for (area, panel) in root.split_evenly((lines, columns)).iter().zip(panels) {
-            let length = panel.runs.iter().map(Vec::len).max().unwrap_or(0);
-            let mut chart = ChartBuilder::on(area)
-                .caption(&panel.title, (FONT, 15))
-                .margin(6)
-                .margin_right(14)
-                .x_label_area_size(34)
-                .y_label_area_size(46)
-                .build_cartesian_2d(-1.0..length as f64 + 1.0, low..high)
-                .map_err(|error| error.to_string())?;
-            chart
-                .configure_mesh()
-                .disable_mesh()
-                .x_labels(6)
-                .y_labels(6)
-                .x_desc(x_name)
-                .y_desc(y_name)
-                .x_label_formatter(&|x| format!("{x:.0}"))
-                .y_label_formatter(&|y| format!("{y:.2}"))
-                .label_style((FONT, 12))
-                .axis_desc_style((FONT, 13))
-                .draw()
-                .map_err(|error| error.to_string())?;
-            let first = rows.len();
-            for at in (0..length).step_by(panel.every) {
-                let mut values: Vec<f64> = panel
-                    .runs
-                    .iter()
-                    .filter_map(|run| run.get(at).copied())
-                    .collect();
-                values.sort_by(f64::total_cmp);
-                let [minimum, lower_quartile, median, upper_quartile, maximum] =
-                    [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| quantile(&values, share));
-                rows.push(BandRow {
-                    panel: &panel.title,
-                    at,
-                    runs: values.len(),
-                    minimum,
-                    lower_quartile,
-                    median,
-                    upper_quartile,
-                    maximum,
-                });
-            }
-            let rows = &rows[first..];
-            let line = |of: fn(&BandRow<'_>) -> f64| rows.iter().map(move |r| (r.at as f64, of(r)));
-            let band = |low, high, share| {
-                let corners: Vec<_> = line(low).chain(line(high).rev()).collect();
-                Polygon::new(corners, OTHER.mix(share).filled()).into_dyn()
-            };
-            let median = line(|row| row.median).collect::<Vec<_>>();
-            let shapes = [
-                band(|row| row.minimum, |row| row.maximum, 0.25),
-                band(|row| row.lower_quartile, |row| row.upper_quartile, 0.5),
-                PathElement::new(median, MEDIAN.stroke_width(2)).into_dyn(),
-            ];
-            chart
-                .draw_series(shapes)
-                .map_err(|error| error.to_string())?;
+    let mut panels = Vec::new();
+    for values in values {
+        let length = values.runs.iter().map(Vec::len).max().unwrap_or(0);
+        let first = rows.len();
+        for at in (0..length).step_by(values.every) {
+            let of_runs = values.runs.iter().filter_map(|run| run.get(at).copied());
+            let mut of_runs: Vec<f64> = of_runs.collect();
+            of_runs.sort_by(f64::total_cmp);
+            let [minimum, lower_quartile, median, upper_quartile, maximum] =
+                [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| quantile(&of_runs, share));
+            rows.push(BandRow {
+                panel: &values.title,
+                at,
+                runs: of_runs.len(),
+                minimum,
+                lower_quartile,
+                median,
+                upper_quartile,
+                maximum,
+            });
         }
-        Ok(())
-    })?;
-    Ok(name.figure(svg, csv_of(&rows)))
-}
-
-type Paper<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-
-/// An SVG whose black is the colour of the text around it.
-fn draw(
-    id: &str,
-    size: (i32, i32),
-    onto: impl FnOnce(&Paper<'_>) -> Result<(), String>,
-) -> Result<String, FigureError> {
-    let mut svg = String::new();
-    let size = (size.0.max(1) as u32, size.1.max(1) as u32);
-    let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-    let drawn = onto(&area).and_then(|()| area.present().map_err(|error| error.to_string()));
-    drop(area);
-    match drawn {
-        Ok(()) => Ok(svg.replace("#000000", "currentColor")),
-        Err(problem) => Err(FigureError {
-            id: id.to_owned(),
-            problem,
-        }),
+        let shown = &rows[first..];
+        let band = |of: fn(&BandRow<'_>) -> (f64, f64)| {
+            let band = shown.iter().map(move |row| {
+                let (low, high) = of(row);
+                (row.at as f64, low, high)
+            });
+            band.collect()
+        };
+        let chart = Chart {
+            x,
+            y,
+            x_range: (-1.0, length as f64 + 1.0),
+            y_range,
+            decimals: 2,
+            bands: vec![
+                band(|row| (row.minimum, row.maximum)),
+                band(|row| (row.lower_quartile, row.upper_quartile)),
+            ],
+            line: shown
+                .iter()
+                .map(|row| (row.at as f64, row.median))
+                .collect(),
+        };
+        panels.push(Panel {
+            title: values.title.clone(),
+            content: Content::Chart(chart),
+        });
     }
-}
-
-fn put<'a, E>(area: &Paper<'a>, element: E) -> Result<(), String>
-where
-    for<'b> &'b E: PointCollection<'b, (i32, i32)>,
-    E: Drawable<SVGBackend<'a>>,
-{
-    area.draw(&element).map_err(|error| error.to_string())
-}
-
-fn text(area: &Paper<'_>, words: &str, at: (i32, i32), size: i32) -> Result<(), String> {
-    put(area, Text::new(words.to_owned(), at, (FONT, size)))
-}
-
-fn csv_of(rows: &[impl Serialize]) -> String {
-    csv_text(rows)
+    name.figure(&panels, 2, &rows)
 }
