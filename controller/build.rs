@@ -1,5 +1,5 @@
-//! Detects targets with SMLAD. Stable Rust cannot query Arm's DSP extension, so the target's name
-//! decides; all other targets use the portable sums.
+//! Detects targets with SMLAD. Stable Rust cannot query Arm's DSP extension, so detection uses the
+//! target's name; all other targets use the portable sums.
 
 use std::env;
 

@@ -1,4 +1,4 @@
-//! The parts of a robot's step, one by one: `cargo bench -p minimal-surprise-controller`.
+//! Benchmarks of the parts of a robot's step: `cargo bench -p minimal-surprise-controller`.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
 use std::hint::black_box;
 
-/// A genome from the middle of an evolution.
+/// Returns a genome from the middle of an evolution.
 fn genome() -> Genome {
     let bytes = include_bytes!("evolved.genome");
     EncodedGenome::decode(bytes)

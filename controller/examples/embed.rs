@@ -1,5 +1,5 @@
-//! The code that a robot maker writes: ten lines for the controller, plus the robot's sensors and
-//! motors.
+//! The code that a robot maker writes: ten lines for the controller, plus the functions that access
+//! the robot's sensors and motors.
 //!
 //! Builds for the host and, unchanged, for a microcontroller:
 //! `cargo build -p minimal-surprise-controller --example embed --features neighbours`.
@@ -8,7 +8,7 @@
 use minimal_surprise_controller::neighbours::{CellSize, InvalidCellSize, Neighbours};
 use minimal_surprise_controller::{Action, Controller, DecodeError, EncodedGenome, State, Turn};
 
-/// The robot's hardware, behind three functions.
+/// The robot's hardware, as three functions.
 pub trait Robot {
     /// Adds the neighbours detected since the last step.
     fn detect(&mut self, neighbours: &mut Neighbours<16>);
@@ -18,7 +18,7 @@ pub trait Robot {
     fn turn(&mut self, turn: Turn);
 }
 
-/// Why the robot did not start.
+/// Reason why the robot did not start.
 pub enum StartError {
     /// The controller cannot run the genome.
     Genome(DecodeError),

@@ -3,22 +3,22 @@
 //! The magnitude `m = |x|` is scaled so that one product yields the segment number and the position
 //! inside the segment: `z = 30·m`, segment `z >> 16`, position `t = (z & 0xffff) − 32768` in Q16,
 //! i.e. −½ ≤ t < ½. A segment is 65536 / 30 ≈ 2184.5 units (0.533) wide. Its cubic is evaluated by
-//! Horner's rule in units of 1/8, each step `(r·t >> 16) + c` truncating as `vpmulhw` does on x86;
-//! then shifted right by 3 and given the sign of x. Every intermediate fits `i16`, so a vector lane
-//! of 16 bits is enough, and eight coefficients of 16 bits fit one 128-bit byte shuffle.
-//! [`activate`] computes the same values in 32 bits, with multiply-accumulate instructions and
-//! without testing the sign.
+//! Horner's rule in units of 1/8; each step `(r·t >> 16) + c` truncates as `vpmulhw` does on x86.
+//! The result is shifted right by 3 and given the sign of x. Every intermediate value fits `i16`,
+//! so 16-bit vector lanes are wide enough, and eight 16-bit coefficients fit one 128-bit byte
+//! shuffle. [`activate`] computes the same values in 32 bits, with multiply-accumulate instructions
+//! and without testing the sign.
 //!
 //! From 17476 units (4.27) upwards the value is 4095: within one unit of 4096·tanh for every larger
 //! x.
 //!
-//! The function is frozen: [`KERNEL_ID`] holds a hash of all its values, and every genome
-//! container carries it.
+//! The function is frozen: [`KERNEL_ID`] holds a hash of all its values, and every genome container
+//! stores it.
 
-/// Segments per unit of 2¹⁶: multiplies the magnitude.
+/// Number of segments per 2¹⁶ units: the factor that scales the magnitude.
 pub const SEGMENT_SCALE: u16 = 30;
 
-/// Larger magnitudes have the same activation as this one.
+/// Largest distinct magnitude: all larger ones have the same activation.
 pub const MAGNITUDE_CLAMP: u16 = 17475;
 
 /// Cubics over the eight segments: `[c0, c1, c2, c3]`, in units of 1/8 of Q3.12.
@@ -40,8 +40,8 @@ pub const SEGMENTS: [[i16; 4]; 8] = [
 /// Value of the activation beyond the last segment, in units of 1/8.
 const TAIL: i32 = 4095 << 3;
 
-/// The coefficients that [`activate`] uses, highest power first: one row per value of `z >> 16`, 0
-/// … 15 and −16 … −1, so that no input needs a clamp, a bounds check or its magnitude.
+/// The coefficients that [`activate`] uses, highest power first. One row per value of `z >> 16`, in
+/// the order 0 … 15 and −16 … −1, so that [`activate`] needs no clamp, bounds check or magnitude.
 ///
 /// If −x has segment s and position t, then x < 0 has segment −1 − s and position −t. (−t does not
 /// fit where t is −½, but only 0 and −32768 have that t, and they do not need −t.) With −t, the row
@@ -64,7 +64,7 @@ pub(crate) static ROWS: [[i32; 4]; 32] = {
     rows
 };
 
-/// tanh in Q3.12: `act(x)` is within 1 unit of 4096·tanh(x / 4096) for every `i16`.
+/// Computes tanh in Q3.12: `act(x)` is within 1 unit of 4096·tanh(x / 4096) for every `i16`.
 ///
 /// Odd, monotone, in \[−4095, 4095\]; `act(−32768) = act(−32767)`. Tests:
 /// `activation_error_max_all_inputs`, `activation_is_odd_and_monotone`,
@@ -80,13 +80,13 @@ pub fn activate(x_q3_12: i16) -> i16 {
     ((r * t + c0) >> 19) as i16
 }
 
-/// `(a · b) >> 16` for `b` in the range of `i16`.
+/// Computes `(a · b) >> 16` for `b` in the range of `i16`.
 #[inline]
 fn mul_high(a: i32, b: i32) -> i32 {
     ((i64::from(a) * i64::from(b)) >> 16) as i32
 }
 
-/// Identifies the arithmetic: a controller refuses genomes evolved under another kernel.
+/// Identifies the arithmetic: a controller rejects genomes evolved with a different kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct KernelId(pub [u8; 8]);

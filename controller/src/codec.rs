@@ -10,7 +10,7 @@
 //! end   4  CRC-32C of everything before
 //! ```
 //!
-//! Decoding borrows the bytes. Every accepted container is the only encoding of its contents:
+//! Decoding borrows the bytes. Every accepted container is the only valid encoding of its contents:
 //! encoding them again yields the same bytes.
 
 use crate::activation::{KERNEL_ID, KernelId};
@@ -22,9 +22,9 @@ use serde::{Deserialize, Serialize};
 
 /// First bytes of every container.
 pub const MAGIC: [u8; 4] = *b"MSGE";
-/// The version that this crate reads and writes.
+/// Format version that this crate reads and writes.
 pub const FORMAT_VERSION: u8 = 1;
-/// Bytes before the header.
+/// Number of bytes before the header.
 pub const PREFIX_BYTES: usize = 8;
 /// Maximum size of a header, in bytes.
 pub const HEADER_BYTES_MAX: usize = 53;
@@ -42,7 +42,7 @@ const _: () = assert!(CONTAINER_BYTES_MAX <= u16::MAX as usize);
 /// CRC-32C (Castagnoli): the checksum of the container.
 pub static CRC_32C: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
 
-/// Where a genome comes from.
+/// Origin of a genome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Provenance {
@@ -50,13 +50,14 @@ pub struct Provenance {
     pub seed: Option<u64>,
     /// Generation that the genome belongs to, counted from 0.
     pub generation: u32,
-    /// Correctly predicted bits in the repetition that determined the genome's fitness.
+    /// Number of correctly predicted bits in the repetition that determined the genome's fitness.
     pub matched_bits: u64,
-    /// Bits sensed in that repetition: fitness is `matched_bits / scored_bits`; 0 if unknown.
+    /// Number of bits sensed in that repetition; 0 if unknown. Fitness is
+    /// `matched_bits / scored_bits`.
     pub scored_bits: u64,
 }
 
-/// The header as it is serialised.
+/// The header, as serialised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Header {
     kernel: KernelId,
@@ -68,17 +69,17 @@ struct Header {
     prediction_weights: u16,
 }
 
-/// The bytes are not a genome that this controller can run.
+/// Error for bytes that are not a genome that this controller can run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DecodeError {
-    /// The bytes end before the container does.
+    /// The bytes end before the end of the container.
     #[error("too short: {found} bytes; at least {needed} are needed")]
     TooShort {
-        /// Bytes given.
+        /// Number of bytes given.
         found: usize,
-        /// Bytes needed, as far as known.
+        /// Number of bytes needed, as far as known.
         needed: usize,
     },
     /// The length field is outside the valid range.
@@ -92,12 +93,12 @@ pub enum DecodeError {
     /// Bytes follow the container.
     #[error("{found} bytes, but the container ends after {length}")]
     TrailingBytes {
-        /// Bytes given.
+        /// Number of bytes given.
         found: usize,
-        /// Bytes of the container.
+        /// Length of the container, in bytes.
         length: usize,
     },
-    /// It does not start with [`MAGIC`].
+    /// The bytes do not start with [`MAGIC`].
     #[error("not a genome: it starts with {found:02x?} instead of {MAGIC:02x?} (\"MSGE\")")]
     WrongMagic {
         /// The first four bytes.
@@ -112,9 +113,9 @@ pub enum DecodeError {
     /// The checksum does not match: the bytes were damaged.
     #[error("damaged: CRC-32C is {found:08x}, the bytes give {computed:08x}")]
     BadCrc {
-        /// The checksum stored.
+        /// The stored checksum.
         found: u32,
-        /// The checksum of the bytes.
+        /// The checksum computed from the bytes.
         computed: u32,
     },
     /// The header length byte is too large.
@@ -131,22 +132,22 @@ pub enum DecodeError {
          {FORMAT_VERSION}, each in its shortest form"
     )]
     MalformedHeader {
-        /// Bytes of the header.
+        /// Length of the header, in bytes.
         length: usize,
     },
-    /// Evolved under another arithmetic.
+    /// The genome was evolved with a different arithmetic.
     #[error("evolved for kernel {found}; this controller is kernel {KERNEL_ID}")]
     OtherKernel {
         /// The kernel of the genome.
         found: KernelId,
     },
-    /// Unknown sensor model.
+    /// The sensor model is unknown.
     #[error("unknown sensor model {found}; 0 to 2 stand for A to C")]
     UnknownModel {
         /// The model byte.
         found: u8,
     },
-    /// Unknown kind of prediction or template.
+    /// The kind of prediction or the template is unknown.
     #[error(
         "unknown prediction scheme {prediction} with template {template}; \
          0 is free (template 0), 1 partly predefined, 2 predefined (template 1 to 4)"
@@ -157,7 +158,7 @@ pub enum DecodeError {
         /// The byte for the template.
         template: u8,
     },
-    /// The model cannot be combined with the predictions.
+    /// The sensor model cannot be combined with the predictions.
     #[error(transparent)]
     NoSuchTopology(#[from] TopologyError),
     /// The numbers of weights do not match the topology or the length.
@@ -166,18 +167,18 @@ pub enum DecodeError {
          {expected_action} and {expected_prediction} in {}", 2 * (expected_action + expected_prediction)
     )]
     SizesDoNotFit {
-        /// Action weights announced.
+        /// Number of action weights stated in the header.
         action: u16,
-        /// Prediction weights announced.
+        /// Number of prediction weights stated in the header.
         prediction: u16,
-        /// Bytes of the weight block.
+        /// Length of the weight block, in bytes.
         bytes: usize,
-        /// Action weights of the topology.
+        /// Number of action weights of the topology.
         expected_action: usize,
-        /// Prediction weights of the topology.
+        /// Number of prediction weights of the topology.
         expected_prediction: usize,
     },
-    /// −32768 is not a weight.
+    /// A weight is −32768, which is not a valid value.
     #[error("weight {index} is −32768; weights are within ±32767")]
     InvalidWeight {
         /// Index of the weight.
@@ -190,11 +191,11 @@ pub enum DecodeError {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("a buffer of {found} bytes; at most {CONTAINER_BYTES_MAX} are needed")]
 pub struct BufferTooSmall {
-    /// Bytes of the buffer.
+    /// Size of the buffer, in bytes.
     pub found: usize,
 }
 
-/// A container that has passed every check; borrows its bytes.
+/// A container that has passed every check; the bytes are borrowed.
 ///
 /// ```
 /// use minimal_surprise_controller::{EncodedGenome, Genome, Provenance, Topology, codec};
@@ -216,7 +217,7 @@ pub struct BufferTooSmall {
 pub struct EncodedGenome<'a> {
     topology: Topology,
     provenance: Provenance,
-    /// Little-endian, one entry per weight.
+    /// Weights as little-endian pairs of bytes.
     weights: &'a [[u8; 2]],
 }
 
@@ -225,8 +226,8 @@ impl<'a> EncodedGenome<'a> {
     ///
     /// # Errors
     /// [`DecodeError`]: the first error found, in the order magic, version, length, checksum,
-    /// header, kernel, topology, sizes, weights. Fewer than [`PREFIX_BYTES`] bytes are reported
-    /// before all others.
+    /// header, kernel, topology, sizes, weights. Input shorter than [`PREFIX_BYTES`] is reported
+    /// before all other errors.
     pub fn decode(bytes: &'a [u8]) -> Result<Self, DecodeError> {
         let prefix = Prefix::read(bytes)?;
         let block = checked_block(bytes, prefix.container_bytes)?;
@@ -270,19 +271,19 @@ impl<'a> EncodedGenome<'a> {
         }
     }
 
-    /// The topology.
+    /// Returns the topology.
     #[must_use]
     pub fn topology(&self) -> Topology {
         self.topology
     }
 
-    /// Returns where the genome comes from.
+    /// Returns the origin of the genome.
     #[must_use]
     pub fn provenance(&self) -> Provenance {
         self.provenance
     }
 
-    /// The weights, Q3.12, in genome order.
+    /// Returns the weights, Q3.12, in genome order.
     pub fn weights(&self) -> impl ExactSizeIterator<Item = i16> + use<'a> {
         self.weights.iter().map(|pair| i16::from_le_bytes(*pair))
     }
@@ -297,7 +298,8 @@ impl<'a> EncodedGenome<'a> {
 /// Writes the container to the front of `buffer` and returns that part of it.
 ///
 /// # Errors
-/// [`BufferTooSmall`]; [`CONTAINER_BYTES_MAX`] bytes are always enough.
+/// [`BufferTooSmall`] if the container does not fit; [`CONTAINER_BYTES_MAX`] bytes are always
+/// enough.
 pub fn encode<'b>(
     genome: &Genome,
     provenance: Provenance,
@@ -340,7 +342,7 @@ pub fn encode<'b>(
 ///
 /// # Errors
 /// [`DecodeError::TooShort`], [`DecodeError::WrongMagic`], [`DecodeError::UnknownVersion`] or
-/// [`DecodeError::ImpossibleLength`].
+/// [`DecodeError::ImpossibleLength`] if the prefix is invalid.
 pub fn container_length(bytes: &[u8]) -> Result<usize, DecodeError> {
     Ok(Prefix::read(bytes)?.container_bytes)
 }
@@ -409,8 +411,10 @@ fn checked_block(bytes: &[u8], length: usize) -> Result<&[u8], DecodeError> {
     body.get(PREFIX_BYTES..).ok_or(too_short)
 }
 
-/// postcard accepts several encodings of a number, and bytes after the last field. Both only make
-/// the header longer, so a header of minimum length is in its canonical form.
+/// Decodes a header and checks that it is in its canonical form.
+///
+/// Postcard accepts several encodings of a number, and bytes after the last field. Both only make
+/// the header longer, so a header of minimum length is canonical.
 fn decode_header(bytes: &[u8]) -> Result<Header, DecodeError> {
     match postcard::from_bytes::<Header>(bytes) {
         Ok(header) if header.shortest_bytes() == bytes.len() => Ok(header),
@@ -421,7 +425,8 @@ fn decode_header(bytes: &[u8]) -> Result<Header, DecodeError> {
 }
 
 impl Header {
-    /// Length of the header in its shortest form, which is the one that postcard writes.
+    /// Returns the length of the header in its shortest form, which is the form that postcard
+    /// writes.
     fn shortest_bytes(&self) -> usize {
         let Provenance {
             seed,
@@ -440,7 +445,7 @@ impl Header {
     }
 }
 
-/// Length of a number encoded with seven bits per byte.
+/// Returns the length of a number encoded with seven bits per byte.
 fn varint_bytes(value: u64) -> usize {
     let bits = u64::BITS - (value | 1).leading_zeros();
     bits.div_ceil(7) as usize

@@ -7,18 +7,18 @@ use crate::sensor::SensorBits;
 use crate::topology::Topology;
 use serde::{Deserialize, Serialize};
 
-/// What a robot does in a step. There is no action for stopping.
+/// Action of a robot in one step. Stopping is not an action.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Action {
-    /// One cell ahead, if it is free. Action value 0.
+    /// Move one cell ahead if that cell is free. Action value 0.
     #[default]
     Straight,
-    /// A quarter turn. Action value 1.
+    /// Make a quarter turn. Action value 1.
     Turn,
 }
 
-/// Which way a robot turns; decided in every step, used only with [`Action::Turn`].
+/// Direction of a turn; decided in every step, used only with [`Action::Turn`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Turn {
@@ -29,15 +29,15 @@ pub enum Turn {
     Clockwise,
 }
 
-/// What one step decides.
+/// Decisions of one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decision {
-    /// What to do.
+    /// The action.
     pub action: Action,
-    /// Which way, if it turns.
+    /// Direction of the turn, if the action is a turn.
     pub turn: Turn,
-    /// Expected next reading, fixed predictions included.
+    /// Predicted next reading, including fixed predictions.
     pub prediction: SensorBits,
 }
 
@@ -76,21 +76,21 @@ pub struct State {
     surprise: Surprise,
 }
 
-/// How many of the bits that a robot sensed were mispredicted.
+/// Counts of the bits that a robot sensed and mispredicted.
 ///
 /// One minus their ratio, over all robots, is the fitness of Eq. 1 of the paper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Surprise {
-    /// Bits that were not as predicted.
+    /// Number of mispredicted bits.
     pub mispredicted_bits: u64,
-    /// Bits sensed.
+    /// Number of bits sensed.
     pub seen_bits: u64,
 }
 
 impl Surprise {
-    /// Mispredicted share in Q16, 0 (every bit predicted) to 65,536 (none), rounded down; 0 before
-    /// the first step.
+    /// Returns the mispredicted share in Q16: 0 (no bit mispredicted) to 65,536 (all), rounded
+    /// down; 0 before the first step.
     #[must_use]
     pub fn share_q16(self) -> u32 {
         match (self.mispredicted_bits << 16).checked_div(self.seen_bits) {
@@ -107,13 +107,14 @@ impl Controller {
         Self::build(genome.topology(), &mut genome.weights().iter().copied())
     }
 
-    /// [`Controller::new`] from a decoded container, without copying the weights.
+    /// Builds the controller of a decoded container, without copying the weights.
     #[must_use]
     pub fn from_encoded(genome: &EncodedGenome<'_>) -> Self {
         Self::build(genome.topology(), &mut genome.weights())
     }
 
-    /// The controller of a genome whose weights are all zero: it turns clockwise in every step.
+    /// Builds the controller of a genome with all weights zero, which turns clockwise in every
+    /// step.
     #[must_use]
     pub fn zeroed(topology: Topology) -> Self {
         Self::build(topology, &mut core::iter::empty())
@@ -139,7 +140,7 @@ impl Controller {
     /// `sensors` and the last action, and predicts the next reading from `sensors` and the new
     /// action.
     ///
-    /// Bits beyond the model's sensors are ignored. Cannot fail, panic or allocate.
+    /// Ignores bits beyond the model's sensors. Cannot fail, panic or allocate.
     // One copy, compiled in this crate: a firmware may optimise this crate for speed and the rest
     // for size.
     #[cfg_attr(has_smlad, inline(never))]
@@ -154,7 +155,7 @@ impl Controller {
         }
     }
 
-    /// The action network alone: a function of the sensor bits and the last action.
+    /// Runs only the action network: a function of the sensor bits and the last action.
     #[inline]
     #[must_use]
     pub fn decide(&self, sensors: SensorBits, last_action: Action) -> (Action, Turn) {
@@ -174,8 +175,8 @@ impl Controller {
         (action, turn)
     }
 
-    /// The rest of a step, once the action is chosen: scores the last prediction and makes the
-    /// next.
+    /// Completes a step after the action is chosen: scores the last prediction and makes the next
+    /// one.
     #[inline]
     pub fn predict(&self, state: &mut State, sensors: SensorBits, action: Action) -> SensorBits {
         let sensors = SensorBits::new(sensors.bits() & self.topology.model().mask().bits());
@@ -190,25 +191,25 @@ impl Controller {
         state.prediction
     }
 
-    /// The topology of the genome.
+    /// Returns the genome's topology.
     #[must_use]
     pub fn topology(&self) -> Topology {
         self.topology
     }
 
-    /// The action network.
+    /// Returns the action network.
     #[must_use]
     pub fn action_network(&self) -> &ActionNetwork {
         &self.action
     }
 
-    /// The prediction network, unless all predictions are fixed.
+    /// Returns the prediction network, or `None` if all predictions are fixed.
     #[must_use]
     pub fn prediction_network(&self) -> Option<&PredictionNetwork> {
         self.prediction.as_ref()
     }
 
-    /// Sensor bits followed by the action value.
+    /// Returns the input bits of a network: the sensor bits followed by the action value.
     #[inline]
     fn inputs(&self, sensors: SensorBits, action: Action) -> u32 {
         let model = self.topology.model();
@@ -238,8 +239,8 @@ pub fn spread(bits: u16, mask: u16) -> u16 {
 }
 
 impl State {
-    /// The state of a robot before its first step: hidden values zero, last action straight, and
-    /// only the fixed predictions.
+    /// Creates the state of a robot before its first step: hidden values zero, last action
+    /// straight, and only the fixed predictions.
     #[must_use]
     pub fn new(controller: &Controller) -> Self {
         Self {
@@ -250,25 +251,25 @@ impl State {
         }
     }
 
-    /// The prediction for the next reading.
+    /// Returns the prediction for the next reading.
     #[must_use]
     pub fn prediction(&self) -> SensorBits {
         self.prediction
     }
 
-    /// The action of the last step; straight before the first.
+    /// Returns the action of the last step; straight before the first step.
     #[must_use]
     pub fn last_action(&self) -> Action {
         self.last_action
     }
 
-    /// The prediction network's hidden activations, Q3.12; zero beyond its neurons.
+    /// Returns the prediction network's hidden activations, Q3.12; zero beyond its neurons.
     #[must_use]
     pub fn hidden_q3_12(&self) -> &[i16; MAX_HIDDEN] {
         &self.hidden_q3_12.0
     }
 
-    /// Surprise since the start, as a robot reports it.
+    /// Returns the surprise since the start, as a robot reports it.
     #[must_use]
     pub fn surprise(&self) -> Surprise {
         self.surprise

@@ -1,10 +1,10 @@
 //! The sums of both layers with SMLAD, two products per instruction, for chips with Arm's DSP
-//! extension such as Cortex-M4 and M7.
+//! extension, such as Cortex-M4 and Cortex-M7.
 //!
-//! The only module of this crate with `unsafe` code. The intrinsic for this instruction is not
-//! stable, and without it the compiler neither emits the instruction nor combines the loads of the
-//! terms: a control step would exceed the instruction budget of a robot (test `budget`). Sums are
-//! exact in any order, so the results equal those of the portable code bit for bit (test `parity`).
+//! This is the only module of the crate that uses `unsafe`. The intrinsic for SMLAD is not stable,
+//! and without it the compiler neither emits the instruction nor combines the loads of the terms: a
+//! control step would exceed the instruction budget of a robot (test `budget`). Sums are exact in
+//! any order, so the results equal those of the portable code bit for bit (test `parity`).
 #![allow(unsafe_code)]
 
 use crate::activation::{ROWS, SEGMENT_SCALE};
@@ -12,8 +12,8 @@ use crate::fixed::{FRACTION_BITS, MAX_TERMS, ROUNDING_Q24};
 use crate::network::Aligned;
 use core::arch::asm;
 
-/// Replaces the first `count` values with their activations: [`activate`](crate::activate), with
-/// the same order of operations.
+/// Replaces the first `count` values with their activations, with the same order of operations as
+/// [`activate`](crate::activate).
 #[inline]
 pub(crate) fn activate_all<const N: usize>(values: &mut [i16; N], count: usize) {
     const { assert!(SEGMENT_SCALE == 15 << 1) };
@@ -119,11 +119,11 @@ pub(crate) fn hidden_sums<const N: usize>(
     }
 }
 
-/// The signs of an output layer: bit k is set if the sum of row k's products with `terms` is not
-/// negative, for the first `count` rows.
+/// Computes the signs of an output layer: bit k is set if the sum of row k's products with `terms`
+/// is not negative, for the first `count` rows.
 ///
 /// # Panics
-/// If a row does not have [`OUTPUT_TERMS`] terms; decided at compile time.
+/// If a row does not have [`OUTPUT_TERMS`] terms; checked at compile time.
 #[inline]
 pub(crate) fn output_signs<const N: usize, const O: usize>(
     rows: &Aligned<[[i16; N]; O]>,
@@ -155,8 +155,8 @@ pub(crate) fn output_signs<const N: usize, const O: usize>(
             "ldr r4, [{row}], #4",
             "smlad {sum}, r2, r4, {sum}",
             "subs {terms}, #16",
-            // The sign is shifted through the carry into the lowest bit; the first row's ends up
-            // highest.
+            // The sign is shifted through the carry into the lowest bit; the first row's sign
+            // becomes the highest bit.
             "lsls {sum}, {sum}, #1",
             "adcs {negative}, {negative}, {negative}",
             "subs {count}, #1",
@@ -182,10 +182,10 @@ pub(crate) fn output_signs<const N: usize, const O: usize>(
 /// Number of terms in each sum of [`action_signs`].
 pub(crate) const ACTION_TERMS: usize = 8;
 
-/// [`output_signs`] for rows of [`ACTION_TERMS`] terms, which stay in registers.
+/// Like [`output_signs`], for rows of [`ACTION_TERMS`] terms, which stay in registers.
 ///
 /// # Panics
-/// If a row does not have that many terms; decided at compile time.
+/// If a row does not have [`ACTION_TERMS`] terms; checked at compile time.
 #[inline]
 pub(crate) fn action_signs<const N: usize, const O: usize>(
     rows: &Aligned<[[i16; N]; O]>,

@@ -6,7 +6,7 @@
 /// 1.0 in Q3.12.
 pub const ONE_Q3_12: i16 = 4096;
 
-/// Fraction bits of Q3.12.
+/// Number of fraction bits of Q3.12.
 pub const FRACTION_BITS: u32 = 12;
 
 /// Largest weight, in Q3.12; the smallest is its negative. −32768 is not a weight.
@@ -26,7 +26,7 @@ const _: () = assert!(
         <= i32::MAX as i64
 );
 
-/// Saturates to the range of `i16`.
+/// Saturates a value to the range of `i16`.
 #[inline]
 #[must_use]
 pub const fn saturate(value: i32) -> i16 {

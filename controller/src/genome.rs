@@ -15,8 +15,9 @@ pub const MUTATION_MAX_Q3_12: i16 = 1638;
 
 /// The weights of an action network and, unless all predictions are fixed, a prediction network.
 ///
-/// Fixed size, large enough for any topology. Weights are Q3.12 within ±32767, in the order
-/// described in [`network`](crate::network): the action network's, then the prediction network's.
+/// The size is fixed and large enough for any topology. Weights are Q3.12 within ±32767, in the
+/// order described in [`network`](crate::network): first those of the action network, then those of
+/// the prediction network.
 ///
 /// ```
 /// use minimal_surprise_controller::{Genome, MutationRate, Topology};
@@ -45,12 +46,12 @@ pub enum GenomeError {
     /// The number of weights does not match the topology.
     #[error("{found} weights; the topology has {expected}")]
     WrongCount {
-        /// Weights given.
+        /// Number of weights given.
         found: usize,
-        /// Weights of the topology.
+        /// Number of weights of the topology.
         expected: usize,
     },
-    /// −32768 is not a weight.
+    /// A weight is −32768, which is not a valid value.
     #[error("weight {index} is −32768; weights are within ±32767")]
     InvalidWeight {
         /// Index of the weight.
@@ -59,7 +60,7 @@ pub enum GenomeError {
 }
 
 impl Genome {
-    /// All weights zero.
+    /// Creates a genome with all weights zero.
     #[must_use]
     pub const fn zeroed(topology: Topology) -> Self {
         Self {
@@ -68,7 +69,7 @@ impl Genome {
         }
     }
 
-    /// From weights in genome order.
+    /// Creates a genome from weights in genome order.
     ///
     /// # Errors
     /// [`GenomeError`] if their number does not match the topology or one of them is −32768.
@@ -85,7 +86,7 @@ impl Genome {
         Ok(Self::from_iter(topology, weights.iter().copied()))
     }
 
-    /// From valid weights whose number matches the topology.
+    /// Creates a genome from valid weights whose number matches the topology.
     pub(crate) fn from_iter(topology: Topology, weights: impl Iterator<Item = i16>) -> Self {
         let mut genome = Self::zeroed(topology);
         for (to, from) in genome.weights_mut().zip(weights) {
@@ -94,7 +95,7 @@ impl Genome {
         genome
     }
 
-    /// Weights uniform within ±[`INITIAL_WEIGHT_MAX_Q3_12`].
+    /// Draws a genome with weights uniform within ±[`INITIAL_WEIGHT_MAX_Q3_12`].
     #[must_use]
     pub fn random<R: Rng>(topology: Topology, rng: &mut R) -> Self {
         let mut genome = Self::zeroed(topology);
@@ -116,13 +117,13 @@ impl Genome {
         }
     }
 
-    /// The topology.
+    /// Returns the topology.
     #[must_use]
     pub const fn topology(&self) -> Topology {
         self.topology
     }
 
-    /// All weights, Q3.12, in genome order.
+    /// Returns all weights, Q3.12, in genome order.
     #[must_use]
     pub fn weights(&self) -> &[i16] {
         self.weights
@@ -130,14 +131,14 @@ impl Genome {
             .unwrap_or(&self.weights)
     }
 
-    /// Weights of the action network.
+    /// Returns the weights of the action network.
     #[must_use]
     pub fn action_weights(&self) -> &[i16] {
         let count = self.topology.action_weights();
         self.weights.get(..count).unwrap_or(&self.weights)
     }
 
-    /// Weights of the prediction network; empty if there is none.
+    /// Returns the weights of the prediction network; empty if all predictions are fixed.
     #[must_use]
     pub fn prediction_weights(&self) -> &[i16] {
         let range = self.topology.action_weights()..self.topology.weights();
@@ -157,8 +158,8 @@ pub struct MutationRate {
 }
 
 impl MutationRate {
-    /// `numerator / denominator`, rounded down to a multiple of 2⁻³²; `None` above 1 or if the
-    /// denominator is 0.
+    /// Returns the rate `numerator / denominator`, rounded down to a multiple of 2⁻³²; `None` if
+    /// the rate is above 1 or the denominator is 0.
     #[must_use]
     pub const fn ratio(numerator: u32, denominator: u32) -> Option<Self> {
         if denominator == 0 || numerator > denominator {
@@ -170,7 +171,7 @@ impl MutationRate {
         }
     }
 
-    /// `threshold / 2³²`; `None` above 1.
+    /// Returns the rate `threshold / 2³²`; `None` above 1.
     #[must_use]
     pub const fn from_per_2_32(threshold: u64) -> Option<Self> {
         if threshold > 1 << 32 {
@@ -183,8 +184,8 @@ impl MutationRate {
     }
 }
 
-/// Uniform in `-max..=max` (Lemire's method): multiplies one word per draw by the number of values,
-/// takes the upper half, and rejects the few words that would bias the result.
+/// Draws a value uniform in `-max..=max` with Lemire's method: multiplies one word per draw by the
+/// number of values, takes the upper half, and rejects the few words that would bias the result.
 fn uniform_within<R: Rng>(rng: &mut R, max: i16) -> i16 {
     let values = 2 * max.unsigned_abs() as u32 + 1;
     let rejected_below = values.wrapping_neg() % values;
@@ -283,7 +284,7 @@ mod tests {
         assert_eq!(MutationRate::from_per_2_32((1 << 32) + 1), None);
     }
 
-    /// Returns the given words in order.
+    /// Generator that returns the given words in order.
     struct Script<I>(I);
 
     impl<I: Iterator<Item = u32>> TryRng for Script<I> {
@@ -338,7 +339,7 @@ mod tests {
     fn a_weight_mutates_on_words_below_the_rate() {
         let topology = Topology::default();
         let rate = MutationRate::from_per_2_32(1000).unwrap();
-        // The first weight mutates, by the largest addend; the others do not.
+        // Only the first weight mutates, by the largest addend.
         let words = [999, u32::MAX].into_iter().chain([1000; 615]);
         let mut genome = Genome::zeroed(topology);
         genome.mutate(rate, &mut Script(words));

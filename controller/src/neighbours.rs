@@ -1,19 +1,20 @@
 //! Converts detected neighbours to sensor bits, for robots that measure range and bearing.
 //!
-//! The robot stands in the middle of its own cell, facing ahead; a neighbour at range r and bearing
-//! b is `r·cos b` ahead and `r·sin b` to the left. With a cell size s, the cell in direction v is
+//! The robot is in the middle of its own cell, facing ahead; a neighbour at range r and bearing b
+//! is `r·cos b` ahead and `r·sin b` to the left. With cell size s, the cell in direction v is
 //! `⌊v / s + ½⌋`: a neighbour exactly on a border belongs to the cell further ahead, or further
 //! left. Trigonometry comes from `micromath`, with an error of at most 0.002 of the range
 //! (`encoding_error_max_bearings`), so a neighbour that close to a border may be assigned to either
-//! side. This is the only floating point on a robot, and it ends at the sensor bits.
+//! side. This conversion is the only floating point on a robot; all later arithmetic is in
+//! integers.
 //!
 //! | detection | result |
 //! |---|---|
 //! | range 0, or within the robot's own cell | ignored |
-//! | range or bearing not a number or infinite, range negative | refused by [`Neighbours::push`], counted in [`Neighbours::refused`] |
-//! | beyond the model's cells | ignored |
+//! | range or bearing not a number or infinite, range negative | rejected by [`Neighbours::push`], counted in [`Neighbours::refused`] |
+//! | outside the model's cells | ignored |
 //! | bearing outside ±π | taken modulo 2π |
-//! | more than fit | the nearest are kept, the others counted in [`Neighbours::dropped`] |
+//! | more neighbours than fit | the nearest are kept, the others counted in [`Neighbours::dropped`] |
 
 use crate::sensor::{SensorBits, SensorModel};
 use micromath::F32;
@@ -45,10 +46,10 @@ pub struct InvalidCellSize {
 }
 
 impl CellSize {
-    /// A cell size in mm.
+    /// Creates a cell size from a length in mm.
     ///
     /// # Errors
-    /// [`InvalidCellSize`] if it is not positive and finite.
+    /// [`InvalidCellSize`] if the length is not positive and finite.
     pub fn from_mm(mm: f32) -> Result<Self, InvalidCellSize> {
         if mm.is_finite() && mm > 0.0 {
             Ok(Self { mm })
@@ -68,7 +69,7 @@ pub struct Neighbours<const N: usize> {
 }
 
 impl<const N: usize> Neighbours<N> {
-    /// No neighbour.
+    /// Creates an empty list.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -108,25 +109,26 @@ impl<const N: usize> Neighbours<N> {
         self.detections.clear();
     }
 
-    /// The detections kept.
+    /// Returns the detections kept.
     #[must_use]
     pub fn detections(&self) -> &[Detection] {
         &self.detections
     }
 
-    /// Detections refused so far: not a number, infinite, or a negative range.
+    /// Returns the number of detections rejected so far: not a number, infinite, or with a negative
+    /// range.
     #[must_use]
     pub fn refused(&self) -> u32 {
         self.refused
     }
 
-    /// Detections dropped so far because the list was full.
+    /// Returns the number of detections dropped so far because the list was full.
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
 
-    /// The sensor bits: a bit is set if at least one neighbour is in its cell.
+    /// Returns the sensor bits: a bit is set if at least one neighbour is in its cell.
     #[must_use]
     pub fn sensor_bits(&self, model: SensorModel, cell: CellSize) -> SensorBits {
         let mut bits = 0;
@@ -144,7 +146,8 @@ impl<const N: usize> Neighbours<N> {
     }
 }
 
-/// Cells ahead and to the left of the robot; for distant neighbours, a cell outside every model.
+/// Returns the number of cells ahead and to the left of the robot; for distant neighbours, a cell
+/// outside every model.
 fn cell_of(detection: Detection, cell: CellSize) -> (i32, i32) {
     let bearing = F32(detection.bearing_rad % core::f32::consts::TAU);
     let cells = F32(detection.range_mm / cell.mm);

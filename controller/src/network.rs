@@ -2,7 +2,7 @@
 //!
 //! With `act` = [`activate`] and all values in Q3.12:
 //!
-//! - input neuron j: `u_j = act(w_j · x_j − θ_j)`, x_j a bit. Its two possible values are
+//! - input neuron j: `u_j = act(w_j · x_j − θ_j)`, where x_j is a bit. Its two possible values are
 //!   precomputed;
 //! - hidden neuron i: `h_i = act(Σ_j W_ij · u_j + r_i · h_i(t−1))`, the last term in the
 //!   prediction network only (paper, Fig. 1b);
@@ -40,32 +40,32 @@ pub struct Shape {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ShapeError {
-    /// A sum would have more terms than are exact in `i32`.
+    /// A sum has too many terms to be exact in `i32`.
     #[error("a sum of {terms} terms; at most {MAX_TERMS} are exact")]
     TooManyTerms {
-        /// Terms of the longest sum.
+        /// Number of terms of the longest sum.
         terms: usize,
     },
-    /// A layer is empty, or exceeds the memory reserved for it.
+    /// A layer is empty or exceeds the memory reserved for it.
     #[error(
         "{inputs}-{hidden}-{outputs} does not fit 1..={MAX_INPUTS} inputs, \
          1..={MAX_HIDDEN} hidden and 1..={MAX_OUTPUTS} output neurons"
     )]
     DoesNotFit {
-        /// Inputs asked for.
+        /// Number of inputs requested.
         inputs: usize,
-        /// Hidden neurons asked for.
+        /// Number of hidden neurons requested.
         hidden: usize,
-        /// Outputs asked for.
+        /// Number of outputs requested.
         outputs: usize,
     },
 }
 
 impl Shape {
-    /// Checks that every sum stays exact and every layer fits.
+    /// Creates a shape after checking that every sum stays exact and every layer fits.
     ///
     /// # Errors
-    /// [`ShapeError`] names the sizes that do not fit.
+    /// [`ShapeError`] if a sum has too many terms, or a layer is empty or too large.
     pub const fn new(
         inputs: usize,
         hidden: usize,
@@ -102,7 +102,7 @@ impl Shape {
         })
     }
 
-    /// [`Shape::new`] for constants: an invalid shape does not compile.
+    /// Creates a shape for a constant like [`Shape::new`]; an invalid shape does not compile.
     pub(crate) const fn checked(
         inputs: usize,
         hidden: usize,
@@ -115,19 +115,19 @@ impl Shape {
         }
     }
 
-    /// Inputs, the action value included.
+    /// Returns the number of inputs, including the action value.
     #[must_use]
     pub const fn inputs(self) -> usize {
         self.inputs as usize
     }
 
-    /// Hidden neurons.
+    /// Returns the number of hidden neurons.
     #[must_use]
     pub const fn hidden(self) -> usize {
         self.hidden as usize
     }
 
-    /// Output neurons.
+    /// Returns the number of output neurons.
     #[must_use]
     pub const fn outputs(self) -> usize {
         self.outputs as usize
@@ -139,33 +139,33 @@ impl Shape {
         self.recurrent
     }
 
-    /// Weights of one hidden neuron.
+    /// Returns the number of weights of one hidden neuron.
     #[must_use]
     pub const fn hidden_row(self) -> usize {
         self.inputs() + self.recurrent as usize
     }
 
-    /// Weights of the whole network.
+    /// Returns the number of weights of the whole network.
     #[must_use]
     pub const fn weights(self) -> usize {
         2 * self.inputs() + self.hidden() * self.hidden_row() + self.outputs() * self.hidden()
     }
 }
 
-/// A network with room for `H` hidden neurons and `O` outputs; entries beyond the shape are zero
+/// A network with memory for `H` hidden neurons and `O` outputs; entries beyond the shape are zero
 /// and add nothing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Network<const H: usize, const O: usize> {
     shape: Shape,
-    /// Activations of two input neurons at a time, for each value of their two bits.
+    /// Activations of each pair of input neurons, for every value of their two bits.
     input: Aligned<[[[i16; 2]; 4]; MAX_TERMS / 2]>,
     /// The inputs' weights, starting at 0, and the self-loop at [`SELF_LOOP`].
     hidden: Aligned<[[i16; MAX_TERMS]; H]>,
     output: Aligned<[[i16; H]; O]>,
 }
 
-/// Word-aligned, so that several weights can be loaded at once.
+/// A word-aligned array, so that several weights can be loaded at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C, align(4))]
@@ -179,7 +179,7 @@ pub type PredictionNetwork = Network<MAX_HIDDEN, MAX_OUTPUTS>;
 impl<const H: usize, const O: usize> Network<H, O> {
     const TERMS_ARE_EXACT: () = assert!(H <= MAX_TERMS && O <= 16, "more than 16 terms in a sum");
 
-    /// A network with all rows zero.
+    /// Creates a network with all rows zero.
     #[inline]
     pub(crate) const fn zeroed(shape: Shape) -> Self {
         let () = Self::TERMS_ARE_EXACT;
@@ -205,13 +205,14 @@ impl<const H: usize, const O: usize> Network<H, O> {
         );
     }
 
-    /// The network's sizes.
+    /// Returns the network's sizes.
     #[must_use]
     pub fn shape(&self) -> Shape {
         self.shape
     }
 
-    /// Activations (Q3.12) of each input neuron for a bit of 0 and of 1; zero beyond the shape.
+    /// Returns the activations (Q3.12) of each input neuron for bit values 0 and 1; zero beyond the
+    /// shape.
     #[must_use]
     pub fn input_levels(&self) -> [[i16; 2]; MAX_INPUTS] {
         core::array::from_fn(|input| {
@@ -220,14 +221,14 @@ impl<const H: usize, const O: usize> Network<H, O> {
         })
     }
 
-    /// Hidden weights (Q3.12): one row per neuron, the self-loop at [`SELF_LOOP`]; zero beyond the
-    /// shape.
+    /// Returns hidden weights (Q3.12): one row per neuron, the self-loop at [`SELF_LOOP`]; zero
+    /// beyond the shape.
     #[must_use]
     pub fn hidden_rows(&self) -> &[[i16; MAX_TERMS]; H] {
         &self.hidden.0
     }
 
-    /// Output weights (Q3.12): one row per output; zero beyond the shape.
+    /// Returns output weights (Q3.12): one row per output; zero beyond the shape.
     #[must_use]
     pub fn output_rows(&self) -> &[[i16; H]; O] {
         &self.output.0
@@ -235,7 +236,7 @@ impl<const H: usize, const O: usize> Network<H, O> {
 
     /// Runs one forward pass: bit j of `inputs` is input j; bit k of the result is set if output k
     /// is not negative. `hidden` holds the last hidden activations and receives the new ones;
-    /// without self-loops the last ones are not used.
+    /// without self-loops, the last activations are not used.
     #[inline]
     pub(crate) fn forward(&self, inputs: u32, hidden: &mut Aligned<[i16; H]>) -> u16 {
         let mut terms = Aligned([0; MAX_TERMS]);
@@ -247,8 +248,8 @@ impl<const H: usize, const O: usize> Network<H, O> {
     }
 }
 
-/// Fills the layers of a network of any size; not generic, so a robot's flash holds one copy. An
-/// output row has `output_row` weights.
+/// Fills the layers of a network of any size. Not generic, so that a robot's flash holds only one
+/// copy. An output row has `output_row` weights.
 #[inline(never)]
 fn read_weights(
     shape: Shape,
@@ -301,8 +302,8 @@ fn select_terms(
     }
 }
 
-/// Replaces each of the first `count` values with the Q3.12 sum of its row's products with `terms`,
-/// the value itself being the last term.
+/// Replaces each of the first `count` values with the Q3.12 sum of its row's products with `terms`;
+/// the value itself is the last term.
 #[cfg(not(has_smlad))]
 #[inline]
 fn hidden_sums<const H: usize>(
@@ -352,8 +353,8 @@ fn output_signs<const H: usize, const O: usize>(
     outputs
 }
 
-/// Exact sum of products, Q24. Callers pass at most [`MAX_TERMS`] terms, with one factor of each
-/// within ±[`ONE_Q3_12`].
+/// Computes the exact sum of products, Q24. Callers pass at most [`MAX_TERMS`] terms, with one
+/// factor of each within ±[`ONE_Q3_12`].
 #[inline]
 fn dot<const N: usize>(weights: &[i16; N], values: &[i16; N]) -> i32 {
     let mut sum = 0;
@@ -430,7 +431,7 @@ mod tests {
         let shape = Shape::new(15, 14, 14, true).unwrap();
         for (level, weight) in [(1, 1), (1, -1), (-1, 1), (-1, -1)] {
             let (level, weight) = (level * 32767, weight * 32767);
-            // Thresholds that make every input neuron as large as the self-loop's value.
+            // The thresholds make every input neuron as large as the self-loop's value.
             let inputs = [0, -level].into_iter().cycle().take(30);
             let mut weights = inputs.chain(core::iter::repeat(weight));
             let network: PredictionNetwork = network(shape, &mut weights);

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 /// Maximum number of sensors of a model (C).
 ///
-/// What depends on it asserts it: sums here, the engine's window, draws of noise, hashes of steps.
+/// Assertions guard everything that depends on this number: the sums in this crate, the engine's
+/// window, the noise draws and the step hashes.
 pub const MAX_SENSORS: usize = 14;
 
 /// A hidden neuron sums the sensors, the action value and its own last output.
@@ -23,7 +24,7 @@ pub struct Cell {
     pub left: i8,
 }
 
-/// Shorthand for the tables below.
+/// Creates a cell; shorthand for the tables below.
 const fn cell(ahead: i8, left: i8) -> Cell {
     Cell { ahead, left }
 }
@@ -40,7 +41,7 @@ static CELLS_A: [Cell; 8] = [
     cell(-1, 1),
 ];
 
-/// Cells of model C; those of model B are its first six.
+/// Cells of model C; its first six are the cells of model B.
 static CELLS_C: [Cell; 14] = [
     cell(1, 0),
     cell(1, -1),
@@ -75,7 +76,7 @@ impl SensorModel {
     /// Every model, in order.
     pub const ALL: [Self; 3] = [Self::A, Self::B, Self::C];
 
-    /// The sensed cells, in the order of the sensor bits.
+    /// Returns the sensed cells, in the order of the sensor bits.
     #[must_use]
     pub const fn cells(self) -> &'static [Cell] {
         match self {
@@ -85,13 +86,13 @@ impl SensorModel {
         }
     }
 
-    /// Number of sensors: 8, 6 or 14.
+    /// Returns the number of sensors: 8, 6 or 14.
     #[must_use]
     pub const fn sensors(self) -> usize {
         self.cells().len()
     }
 
-    /// A mask with one bit set for every sensor of the model.
+    /// Returns a mask with one bit set for every sensor of the model.
     #[must_use]
     pub const fn mask(self) -> SensorBits {
         SensorBits((1 << self.sensors()) - 1)
@@ -104,28 +105,28 @@ impl SensorModel {
 pub struct SensorBits(u16);
 
 impl SensorBits {
-    /// No sensor reads occupied.
+    /// The reading with no occupied cell.
     pub const NONE: Self = Self(0);
 
-    /// From raw bits. The controller ignores bits beyond the model's sensors.
+    /// Creates sensor bits from raw bits. The controller ignores bits beyond the model's sensors.
     #[must_use]
     pub const fn new(bits: u16) -> Self {
         Self(bits)
     }
 
-    /// The raw bits.
+    /// Returns the raw bits.
     #[must_use]
     pub const fn bits(self) -> u16 {
         self.0
     }
 
-    /// Returns whether sensor `index` reads occupied; false for an index beyond 15.
+    /// Returns true if sensor `index` reads occupied; false for an index beyond 15.
     #[must_use]
     pub const fn get(self, index: usize) -> bool {
         index < 16 && self.0 >> index & 1 == 1
     }
 
-    /// Number of sensors that differ.
+    /// Counts the sensors whose bits differ.
     #[must_use]
     pub const fn differing(self, other: Self) -> u32 {
         (self.0 ^ other.0).count_ones()

@@ -1,4 +1,4 @@
-//! Topologies: which networks a genome describes, and which predictions they make.
+//! Topologies: the networks that a genome describes and the predictions that they make.
 
 use crate::network::Shape;
 use crate::sensor::{SensorBits, SensorModel};
@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Template {
-    /// Robots ahead and behind (as far as the model senses).
+    /// Robots ahead and behind, as far as the model senses.
     Line,
-    /// One robot, right ahead.
+    /// One robot directly ahead.
     Pair,
     /// Robots two cells ahead and behind; model C only.
     Square,
@@ -27,7 +27,7 @@ impl Template {
         Self::TriangularLattice,
     ];
 
-    /// The name used in files and on the command line.
+    /// Returns the name used in files and on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -38,7 +38,8 @@ impl Template {
         }
     }
 
-    /// The sensors that the template predicts occupied, if it exists for the model.
+    /// Returns the sensors that the template predicts occupied; `None` if the model does not
+    /// support the template.
     #[must_use]
     pub const fn bits(self, model: SensorModel) -> Option<SensorBits> {
         Some(SensorBits::new(match (self, model) {
@@ -53,10 +54,10 @@ impl Template {
     }
 }
 
-/// The line sensors of model C.
+/// Sensors of model C that the line sets.
 const LINE_C: u16 = bits_at(&[0, 3, 8, 11]);
 
-/// A word with the bits of the given sensors set.
+/// Returns a word with the bits of the given sensors set.
 const fn bits_at(sensors: &[u8]) -> u16 {
     let mut bits = 0;
     let mut index = 0;
@@ -67,17 +68,17 @@ const fn bits_at(sensors: &[u8]) -> u16 {
     bits
 }
 
-/// Which predictions the network makes, and which are fixed in advance.
+/// Division of the predictions between the network and fixed values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Prediction {
     /// The network predicts every sensor.
     #[default]
     Free,
-    /// The sensors that the template sets are always predicted occupied; the network predicts the
-    /// others. Available only for the line on model C.
+    /// The sensors in the template are always predicted occupied; the network predicts the others.
+    /// Available only for the line on model C.
     PartlyPredefined(Template),
-    /// Every sensor is always predicted as the template says; there is no prediction network.
+    /// Every sensor has the fixed prediction of the template; there is no prediction network.
     Predefined(Template),
 }
 
@@ -97,17 +98,17 @@ pub enum TopologyError {
     /// Squares and triangular lattices need model C.
     #[error("the template {} does not exist for sensor model {model:?}, only for C", template.name())]
     NoSuchTemplate {
-        /// The template asked for.
+        /// The template requested.
         template: Template,
-        /// The sensor model asked for.
+        /// The sensor model requested.
         model: SensorModel,
     },
     /// Partly predefined predictions exist only for the line on model C.
     #[error("partly predefined predictions exist for the line on sensor model C only, not for the {} on {model:?}", template.name())]
     NotPartly {
-        /// The template asked for.
+        /// The template requested.
         template: Template,
-        /// The sensor model asked for.
+        /// The sensor model requested.
         model: SensorModel,
     },
 }
@@ -140,7 +141,7 @@ impl Topology {
     /// Creates a topology if the combination is valid.
     ///
     /// # Errors
-    /// [`TopologyError`] names the template and the model that cannot be combined.
+    /// [`TopologyError`] if the template and the model cannot be combined.
     pub const fn new(model: SensorModel, prediction: Prediction) -> Result<Self, TopologyError> {
         match prediction {
             Prediction::PartlyPredefined(template)
@@ -155,7 +156,7 @@ impl Topology {
         }
     }
 
-    /// The sensor model.
+    /// Returns the sensor model.
     #[must_use]
     pub const fn model(self) -> SensorModel {
         self.model
@@ -167,13 +168,13 @@ impl Topology {
         self.prediction
     }
 
-    /// Number of sensors.
+    /// Returns the number of sensors.
     #[must_use]
     pub const fn sensors(self) -> usize {
         self.model.sensors()
     }
 
-    /// A mask with one bit set for every sensor that the prediction network predicts.
+    /// Returns a mask with one bit set for every sensor that the prediction network predicts.
     #[must_use]
     pub const fn predicted(self) -> SensorBits {
         let all = self.model.mask().bits();
@@ -184,7 +185,8 @@ impl Topology {
         })
     }
 
-    /// The fixed predictions, zero elsewhere; also the prediction for a robot's first reading.
+    /// Returns the fixed predictions, zero elsewhere; also the prediction for a robot's first
+    /// reading.
     #[must_use]
     pub const fn fixed(self) -> SensorBits {
         match self.prediction {
@@ -198,7 +200,7 @@ impl Topology {
         }
     }
 
-    /// Shape of the action network.
+    /// Returns shape of the action network.
     #[must_use]
     pub const fn action_shape(self) -> Shape {
         match self.model {
@@ -208,7 +210,7 @@ impl Topology {
         }
     }
 
-    /// Shape of the prediction network, if there is one.
+    /// Returns the shape of the prediction network; `None` if all predictions are fixed.
     #[must_use]
     pub const fn prediction_shape(self) -> Option<Shape> {
         match (self.prediction, self.model) {
@@ -222,13 +224,13 @@ impl Topology {
         }
     }
 
-    /// Number of weights of the action network.
+    /// Returns the number of weights of the action network.
     #[must_use]
     pub const fn action_weights(self) -> usize {
         self.action_shape().weights()
     }
 
-    /// Number of weights of the prediction network; 0 if there is none.
+    /// Returns the number of weights of the prediction network; 0 if all predictions are fixed.
     #[must_use]
     pub const fn prediction_weights(self) -> usize {
         match self.prediction_shape() {
@@ -237,7 +239,7 @@ impl Topology {
         }
     }
 
-    /// Number of weights of a genome.
+    /// Returns the number of weights of a genome.
     #[must_use]
     pub const fn weights(self) -> usize {
         self.action_weights() + self.prediction_weights()

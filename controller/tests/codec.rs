@@ -1,8 +1,8 @@
-//! The genome container (`docs/genome-format.md`): what is written can be read back, everything
-//! else is refused, and nothing panics.
+//! The genome container (`docs/genome-format.md`): every written container can be read back,
+//! invalid bytes are rejected, and nothing panics.
 //!
-//! Containers are also assembled here field by field, without the crate's writer, so that checksum
-//! and lengths can be right although a later check must fail.
+//! The tests also assemble containers field by field, without the crate's writer, so that the
+//! checksum and lengths can be correct although a later check must fail.
 
 use minimal_surprise_controller::codec::{
     BufferTooSmall, CONTAINER_BYTES_MAX, CRC_32C, HEADER_BYTES_MAX, container_length, encode,
@@ -24,7 +24,7 @@ const SEED: u64 = 2020;
 const PREFIX_BYTES: usize = 8;
 const CRC_BYTES: usize = 4;
 
-/// The fields of a container, each of which may be wrong.
+/// The fields of a container; each may be invalid.
 #[derive(Clone, Debug)]
 struct Fields {
     kernel: [u8; 8],
@@ -40,7 +40,8 @@ struct Fields {
     weights: Vec<i16>,
 }
 
-/// Seven bits per byte, the lowest first; all bytes but the last with the highest bit set.
+/// Encodes a number with seven bits per byte, lowest bits first; the highest bit is set in all
+/// bytes but the last.
 fn varint(mut value: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
     while value >= 128 {
@@ -107,7 +108,7 @@ impl Fields {
     }
 }
 
-/// A container of any header and weight bytes, with matching lengths and checksum.
+/// Assembles a container from any header and weight bytes, with matching lengths and checksum.
 fn container(header: &[u8], weights: &[u8]) -> Vec<u8> {
     let mut bytes = b"MSGE\x01\0\0\0".to_vec();
     bytes[5] = header.len() as u8;
@@ -142,7 +143,7 @@ fn rng() -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(SEED)
 }
 
-/// Numbers of every length, the largest included.
+/// Draws numbers of every length, including the largest number.
 fn random_provenance(rng: &mut ChaCha8Rng) -> Provenance {
     let mut number = || rng.next_u64() >> (rng.next_u32() % 64);
     let seed = number();
@@ -170,7 +171,7 @@ fn random_genome(topology: Topology, rng: &mut ChaCha8Rng) -> Genome {
     Genome::from_weights(topology, &weights).unwrap()
 }
 
-/// One container of every topology.
+/// Returns one container of every topology.
 fn containers() -> Vec<Vec<u8>> {
     let mut rng = rng();
     Topology::ALL
@@ -291,7 +292,7 @@ fn every_single_bit_flip_is_refused() {
     println!("{cases} bit flips");
 }
 
-/// Decoding fails, or the bytes are the only encoding of what was read.
+/// Checks that decoding fails, or that the bytes are the only encoding of the decoded genome.
 fn refused_or_the_only_encoding(bytes: &[u8]) -> Result<(), TestCaseError> {
     if let Ok(read) = decode(bytes) {
         let genome = read.to_genome();
@@ -311,12 +312,12 @@ fn config(cases: u32) -> ProptestConfig {
     }
 }
 
-/// Values that distinguish the fields, and arbitrary ones.
+/// Generates arbitrary bytes, and values that distinguish the fields.
 fn byte() -> impl Strategy<Value = u8> {
     prop_oneof![any::<u8>(), 0_u8..6, Just(0x7f), Just(0x80), Just(0xff)]
 }
 
-/// Bytes of a number, in shortest form or not, of a valid size or not.
+/// Generates the bytes of a number; form and size may be invalid.
 fn loose_varint() -> impl Strategy<Value = Vec<u8>> {
     (any::<u64>(), 0_u32..64, 0_usize..3, byte()).prop_map(|(value, shift, padding, last)| {
         let mut bytes = varint(value >> shift);
@@ -458,12 +459,12 @@ proptest! {
     }
 }
 
-/// A number below `end`.
+/// Draws a number below `end`.
 fn below(end: usize, rng: &mut ChaCha8Rng) -> usize {
     rng.next_u32() as usize % end
 }
 
-/// The name of the outcome of decoding.
+/// Returns the name of the outcome of decoding.
 fn outcome(result: Result<EncodedGenome<'_>, DecodeError>) -> String {
     match result {
         Ok(_) => "accepted".to_owned(),
@@ -481,7 +482,7 @@ fn half_a_million_random_containers_reach_every_outcome_and_never_panic() {
     let mut outcomes = BTreeMap::<String, u32>::new();
     let valid = containers();
     for case in 0..500_000 {
-        // Mostly small containers, whose checksums take little time.
+        // Most containers are small, so that computing the checksums takes little time.
         let any_size = below(32, &mut rng) == 0;
         let mut bytes = loop {
             let bytes = &valid[below(valid.len(), &mut rng)];
@@ -532,7 +533,7 @@ fn half_a_million_random_containers_reach_every_outcome_and_never_panic() {
     assert_eq!(outcomes.len(), 15, "seed {SEED}: {outcomes:?}");
 }
 
-/// Asserts that decoding fails with this error and that its message contains these words.
+/// Asserts that decoding fails with this error and that the message contains these words.
 fn assert_refused(bytes: &[u8], error: DecodeError, words: &[&str]) {
     assert_eq!(decode(bytes), Err(error));
     let message = error.to_string();
@@ -949,11 +950,11 @@ fn errors_are_reported_in_the_order_of_the_format() {
     );
 }
 
-/// The example of `docs/genome-format.md`.
+/// The example in `docs/genome-format.md`.
 static FIXTURE: &[u8] = include_bytes!("b-predefined-line.genome");
 
-/// The contents of the fixture: sensor model B, predefined line, weights from ChaCha8 seeded with
-/// 2020.
+/// Returns the contents of the fixture: sensor model B, predefined line, weights from ChaCha8
+/// seeded with 2020.
 fn fixture() -> (Genome, Provenance) {
     let topology = Topology::new(SensorModel::B, Prediction::Predefined(Template::Line)).unwrap();
     let genome = Genome::random(topology, &mut rng());

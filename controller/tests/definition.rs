@@ -1,4 +1,4 @@
-//! Compares a control step with the definition in `network` and in the paper, written as plain
+//! Compares a control step with the definitions in `network` and in the paper, implemented as plain
 //! loops.
 
 use minimal_surprise_controller::network::{MAX_HIDDEN, Network, SELF_LOOP};
@@ -11,7 +11,7 @@ use rand_core::{Rng, SeedableRng};
 
 const SEED: u64 = 2014;
 
-/// Sums saturate to 16 bits before activation.
+/// Computes the activation of a sum, saturated to 16 bits.
 fn act(sum: i64) -> i64 {
     activate(sum.clamp(i16::MIN.into(), i16::MAX.into()) as i16).into()
 }
@@ -46,7 +46,7 @@ fn forward(
     (outputs, hidden)
 }
 
-/// Inputs, hidden neurons and outputs of both networks, as in the paper.
+/// Returns the numbers of inputs, hidden neurons and outputs of both networks, as in the paper.
 fn sizes(topology: Topology) -> ([usize; 2], Option<[usize; 2]>) {
     let [action, free] = match topology.model() {
         SensorModel::A => [[9, 6], [8, 8]],
@@ -61,7 +61,7 @@ fn sizes(topology: Topology) -> ([usize; 2], Option<[usize; 2]>) {
     (action, prediction)
 }
 
-/// Small weights, weights across the whole range, or saturated weights.
+/// Draws a genome with small weights, weights across the whole range, or saturated weights.
 fn genome(topology: Topology, kind: usize, rng: &mut ChaCha8Rng) -> Genome {
     let weights: Vec<i16> = (0..topology.weights())
         .map(|_| {
@@ -147,7 +147,7 @@ fn every_step_follows_the_equations() {
     }
 }
 
-/// Asserts that a network exposes the next weights, and zeros where it has no neuron.
+/// Asserts that a network exposes the next weights, and zeros beyond its neurons.
 fn assert_shows<const H: usize, const O: usize>(
     network: &Network<H, O>,
     weights: &mut impl Iterator<Item = i16>,

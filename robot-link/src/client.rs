@@ -8,7 +8,7 @@ use crate::message::{
 
 /// The host's end of the line: one request at a time, and its reply.
 ///
-/// It has no clock: the caller waits, and calls [`Client::timed_out`].
+/// A client has no clock: the caller waits, and calls [`Client::timed_out`].
 ///
 /// ```
 /// use minimal_surprise_link::{Client, Reply, Request, Server};
@@ -36,7 +36,7 @@ pub struct Client {
     session: u32,
     /// Number of the next request; `None` after 2³² requests.
     next: Option<u32>,
-    /// Number of the request that awaits its reply, and how often it was sent.
+    /// Number of the request whose reply is pending, and how often it was sent.
     pending: Option<(u32, u32)>,
     attempts_max: u32,
     wire: [u8; WIRE_BYTES_MAX],
@@ -45,41 +45,41 @@ pub struct Client {
     last_malformed: Option<MalformedMessage>,
 }
 
-/// The request cannot be sent, or not yet.
+/// Reason why a request cannot be sent, at least not yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RequestError {
-    /// The last request has neither been answered nor given up.
-    #[error("the robot has not answered the last request yet")]
+    /// The reply to the last request is still pending.
+    #[error("the robot has not replied to the last request yet")]
     Pending,
-    /// A session begins with [`Request::Identify`].
+    /// The session does not begin with [`Request::Identify`].
     #[error("the first request of a session is to identify")]
     IdentifyFirst,
     /// The chunk has more than [`CHUNK_BYTES_MAX`] bytes.
     #[error("a chunk of {found} bytes; at most {CHUNK_BYTES_MAX} go into a request")]
     ChunkTooLong {
-        /// Bytes of the chunk.
+        /// Size of the chunk, in bytes.
         found: usize,
     },
-    /// All 2³² numbers are used; open another session.
-    #[error("no number is left for a request; open another session")]
+    /// All 2³² numbers are used; open a new session.
+    #[error("no number is left for a request; open a new session")]
     SessionExhausted,
 }
 
-/// The robot has not answered. It may or may not have carried out the request.
+/// Error for a robot that has not replied. It may or may not have executed the request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no answer to a request sent {attempts} times")]
+#[error("no reply to a request sent {attempts} times")]
 pub struct GaveUp {
-    /// How often the request was sent.
+    /// Number of times that the request was sent.
     pub attempts: u32,
 }
 
 impl Client {
-    /// Default for how often a request is sent.
+    /// Default for the maximum number of times that a request is sent.
     pub const ATTEMPTS_MAX: u32 = 5;
 
-    /// A new session. Its number must not have been used on this line before: use a random one. A
-    /// request is sent at most `attempts_max` times, and at least once.
+    /// Creates a new session. The session number must not have been used on this line before: use a
+    /// random number. A request is sent at most `attempts_max` times, and at least once.
     #[must_use]
     pub const fn new(session: u32, attempts_max: u32) -> Self {
         Self {
@@ -95,16 +95,16 @@ impl Client {
         }
     }
 
-    /// Limits how often a request is sent, from the next attempt on. A request is sent at least
-    /// once.
+    /// Changes the maximum number of times that a request is sent, starting with the next attempt.
+    /// A request is sent at least once.
     pub const fn set_attempts_max(&mut self, attempts_max: u32) {
         self.attempts_max = attempts_max;
     }
 
-    /// The bytes to send for a request. Wait [`Request::timeout_ms`] for the reply.
+    /// Returns the bytes to send for a request. Wait [`Request::timeout_ms`] for the reply.
     ///
     /// # Errors
-    /// [`RequestError`]; send nothing in that case.
+    /// [`RequestError`] if the request cannot be sent; send nothing in that case.
     pub fn request(&mut self, request: &Request<'_>) -> Result<&[u8], RequestError> {
         if self.pending.is_some() {
             return Err(RequestError::Pending);
@@ -134,8 +134,8 @@ impl Client {
         Ok(self.frame())
     }
 
-    /// Takes one byte from the line; returns the reply to the pending request if the byte completes
-    /// it. Anything else that arrives is counted and dropped.
+    /// Takes one byte from the line. If the byte completes the reply to the pending request,
+    /// returns the reply. Everything else that arrives is counted and discarded.
     pub fn feed(&mut self, byte: u8) -> Option<Reply<'_>> {
         if !self.decoder.feed(byte) {
             return None;
@@ -158,10 +158,11 @@ impl Client {
         }
     }
 
-    /// Call this if the reply has not arrived in time. Returns the bytes to send again.
+    /// Returns the bytes to send again; to be called if the reply has not arrived in time.
     ///
     /// # Errors
-    /// [`GaveUp`] if that was the last attempt, or nothing was pending; another request may follow.
+    /// [`GaveUp`] if that was the last attempt, or no request was pending; a new request may
+    /// follow.
     pub fn timed_out(&mut self) -> Result<&[u8], GaveUp> {
         match self.pending {
             Some((sequence, attempts)) if attempts < self.attempts_max => {
@@ -176,20 +177,20 @@ impl Client {
         }
     }
 
-    /// Frames that arrived and were not the reply to the pending request.
+    /// Returns the number of frames received that were not the reply to the pending request.
     #[must_use]
     pub fn strays(&self) -> u32 {
         self.strays
     }
 
-    /// Why the last malformed frame was not a message of this protocol. Distinguishes another
-    /// device, or another version, from silence.
+    /// Returns why the last malformed frame was not a message of this protocol. This distinguishes
+    /// a different device or protocol version from silence.
     #[must_use]
     pub fn last_malformed(&self) -> Option<MalformedMessage> {
         self.last_malformed
     }
 
-    /// Counts of received data that was not a valid frame.
+    /// Returns the counts of received data that was not a valid frame.
     #[must_use]
     pub fn errors(&self) -> LineErrors {
         self.decoder.errors()

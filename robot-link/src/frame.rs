@@ -6,18 +6,18 @@ use serde::Serialize;
 
 /// Maximum size of a message, in bytes.
 pub const PAYLOAD_BYTES_MAX: usize = 146;
-/// Bytes of the CRC-32C after the message, little-endian.
+/// Size of the CRC-32C after the message, in bytes; little-endian.
 const CRC_BYTES: usize = 4;
 /// Maximum size of a frame before COBS, in bytes.
 pub const FRAME_BYTES_MAX: usize = PAYLOAD_BYTES_MAX + CRC_BYTES;
-/// Maximum size of a frame on the line, in bytes: a zero before it, one byte of COBS, a zero after
-/// it.
+/// Maximum size of a frame on the line, in bytes: one zero before it, one byte added by COBS, and
+/// one zero after it.
 pub const WIRE_BYTES_MAX: usize = FRAME_BYTES_MAX + 3;
 
 // One byte of overhead is enough for frames this short.
 const _: () = assert!(FRAME_BYTES_MAX < 254);
 
-/// The message does not fit a frame.
+/// Error for a message that does not fit a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("a message of more than {PAYLOAD_BYTES_MAX} bytes")]
@@ -46,13 +46,14 @@ pub fn encode(message: &impl Serialize, wire: &mut [u8]) -> Result<usize, Encode
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineErrors {
-    /// Frames with a wrong CRC.
+    /// Number of frames with a wrong CRC.
     pub bad_crc: u32,
-    /// Bytes between two zero bytes that are not a frame: damaged, truncated or too long.
+    /// Number of byte sequences between two zeros that are not a frame: damaged, truncated or too
+    /// long.
     pub no_frame: u32,
 }
 
-/// Finds frames in a stream of bytes, some of which may be missing, wrong or extra.
+/// Detector of frames in a stream of bytes, some of which may be missing, wrong or extra.
 #[derive(Debug)]
 pub struct Decoder {
     cobs: DecoderState,
@@ -64,7 +65,7 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// A decoder that has received nothing.
+    /// Creates a decoder that has received nothing.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -80,8 +81,8 @@ impl Decoder {
         }
     }
 
-    /// Takes one byte; returns whether it completed a frame with a correct CRC. The message is in
-    /// [`Decoder::payload`] until the next byte is fed.
+    /// Takes one byte; returns true if the byte completes a frame with a correct CRC. The message
+    /// is in [`Decoder::payload`] until the next byte is fed.
     pub fn feed(&mut self, byte: u8) -> bool {
         if self.complete {
             self.start_over();
@@ -113,7 +114,8 @@ impl Decoder {
         }
     }
 
-    /// The message of the frame that the last byte completed; empty if it completed none.
+    /// Returns the message of the frame that the last byte completed; empty if it completed no
+    /// frame.
     #[must_use]
     pub fn payload(&self) -> &[u8] {
         match self.frame() {
@@ -122,7 +124,7 @@ impl Decoder {
         }
     }
 
-    /// The CRC of that frame; 0 if there is none.
+    /// Returns the CRC of the frame that the last byte completed; 0 if it completed no frame.
     #[must_use]
     pub fn crc(&self) -> u32 {
         match self.frame() {
@@ -131,13 +133,13 @@ impl Decoder {
         }
     }
 
-    /// Counts of received data that was not a valid frame.
+    /// Returns the counts of received data that was not a valid frame.
     #[must_use]
     pub fn errors(&self) -> LineErrors {
         self.errors
     }
 
-    /// Message and CRC.
+    /// Splits the frame received into message and CRC.
     fn frame(&self) -> Option<(&[u8], u32)> {
         let (payload, crc) = self.bytes.get(..self.length)?.split_last_chunk()?;
         Some((payload, u32::from_le_bytes(*crc)))

@@ -12,13 +12,13 @@ pub const FIRMWARE_BYTES_MAX: usize = 32;
 /// Maximum length of a firmware's version, in bytes; longer versions are truncated.
 pub const VERSION_BYTES_MAX: usize = 16;
 
-/// Direction of a message, so that an echo is not taken for a reply.
+/// Direction of a message, so that an echo is not mistaken for a reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Direction {
-    /// From the host to the robot. 0.
+    /// From the host to the robot; encoded as 0.
     Request,
-    /// From the robot to the host. 1.
+    /// From the robot to the host; encoded as 1.
     Reply,
 }
 
@@ -30,12 +30,11 @@ pub struct Envelope<B> {
     pub version: u8,
     /// Direction of the message.
     pub direction: Direction,
-    /// The session that the message belongs to; the host chooses a number that it has not used
-    /// before.
+    /// The session that the message belongs to: a number that the host has not used before.
     pub session: u32,
-    /// Number of the request in the session, counted from 0; a reply has the number of its request.
+    /// Number of the request in its session, counted from 0; a reply has the number of its request.
     pub sequence: u32,
-    /// [`Request`] or [`Reply`].
+    /// The [`Request`] or [`Reply`].
     pub body: B,
 }
 
@@ -43,43 +42,44 @@ pub struct Envelope<B> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Request<'a> {
-    /// Who are you? Request 0 of every session. Answer: [`Reply::Identity`].
+    /// Identify the robot. Request 0 of every session. Reply: [`Reply::Identity`].
     Identify,
-    /// A genome container follows; erases the slot that is not in use. Answer: [`Reply::Done`].
+    /// Start an update: erase the slot that is not in use, then expect a genome container. Reply:
+    /// [`Reply::Done`].
     Begin {
-        /// Bytes of the container.
+        /// Length of the container, in bytes.
         length: u16,
-        /// Its last four bytes, little-endian.
+        /// The container's last four bytes, little-endian.
         crc: u32,
     },
-    /// The next bytes of the container. Answer: [`Reply::Done`].
+    /// Write the next bytes of the container. Reply: [`Reply::Done`].
     Chunk {
-        /// Number of bytes before these.
+        /// Number of container bytes before this chunk.
         offset: u16,
-        /// At most [`CHUNK_BYTES_MAX`] bytes.
+        /// The chunk, at most [`CHUNK_BYTES_MAX`] bytes.
         data: &'a [u8],
     },
-    /// The container is complete: check it and switch to it. Reply: [`Reply::Committed`].
+    /// Check the complete container and switch to it. Reply: [`Reply::Committed`].
     Commit,
-    /// One control step with these readings instead of the robot's own, without moving. Answer:
+    /// Run one control step with these readings instead of the robot's own, without moving. Reply:
     /// [`Reply::Stepped`].
     Step {
         /// The readings, bit k for sensor k.
         sensors: SensorBits,
     },
-    /// Reset the controller's state to that at the start. Answer: [`Reply::Done`].
+    /// Reset the controller's state to its initial value. Reply: [`Reply::Done`].
     Reset,
-    /// Run the control loop. Answer: [`Reply::Done`].
+    /// Run the control loop. Reply: [`Reply::Done`].
     Start,
-    /// Stop motors and control loop. Answer: [`Reply::Done`].
+    /// Stop motors and control loop. Reply: [`Reply::Done`].
     Stop,
-    /// Report the status. Answer: [`Reply::Telemetry`].
+    /// Report the status. Reply: [`Reply::Telemetry`].
     Telemetry,
 }
 
 impl Request<'_> {
-    /// How long to wait for the answer before repeating the request, in milliseconds: 500, and
-    /// 10,000 for [`Request::Begin`], which may erase 128 KiB and more.
+    /// Returns the time to wait for the reply before repeating the request, in milliseconds: 500,
+    /// or 10,000 for [`Request::Begin`], which may erase 128 KiB and more.
     #[must_use]
     pub const fn timeout_ms(&self) -> u32 {
         match self {
@@ -89,64 +89,64 @@ impl Request<'_> {
     }
 }
 
-/// An answer from the robot.
+/// A reply from the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reply<'a> {
-    /// To [`Request::Identify`].
+    /// Reply to [`Request::Identify`].
     #[serde(borrow)]
     Identity(Identity<'a>),
-    /// The request was carried out; there is nothing to report.
+    /// The request was executed; there is no result to report.
     Done,
     /// The genome is in use, also after a restart.
     Committed {
         /// Number of the genome among all written to this robot.
         write_count: u32,
     },
-    /// To [`Request::Step`].
+    /// Reply to [`Request::Step`].
     Stepped(Stepped),
-    /// To [`Request::Telemetry`].
+    /// Reply to [`Request::Telemetry`].
     Telemetry {
         /// The robot's report.
         report: Report,
-        /// The counters of its end of the line.
+        /// Counters of the robot's end of the line.
         line: LineCounters,
     },
     /// The request was refused.
     Refused(Refusal),
 }
 
-/// Who the robot is and what it runs.
+/// Firmware, genome and status of a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Identity<'a> {
     /// Name of the firmware, at most [`FIRMWARE_BYTES_MAX`] bytes.
     pub firmware: &'a str,
-    /// Its version, at most [`VERSION_BYTES_MAX`] bytes.
+    /// Version of the firmware, at most [`VERSION_BYTES_MAX`] bytes.
     pub version: &'a str,
-    /// The arithmetic that it uses.
+    /// The arithmetic that the firmware uses.
     pub kernel: KernelId,
     /// The genome in use.
     pub genome: GenomeInUse,
-    /// Whether the control loop runs.
+    /// True if the control loop runs.
     pub running: bool,
     /// Current faults.
     pub faults: Faults,
 }
 
-/// Where the genome in use comes from.
+/// Origin of the genome in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum GenomeInUse {
-    /// The built-in genome, because there is no other: the robot only turns.
+    /// The built-in genome, because no slot holds a genome to run: the robot only turns.
     BuiltIn,
-    /// A genome that was written.
+    /// A genome that was written to a slot.
     Slot {
-        /// Which slot, 0 or 1.
+        /// Index of the slot, 0 or 1.
         slot: u8,
-        /// Its number among all genomes written to this robot, counted from 1.
+        /// Number of the genome among all genomes written to this robot, counted from 1.
         write_count: u32,
-        /// Bytes of the container.
+        /// Length of the container, in bytes.
         length: u16,
         /// The container's last four bytes, little-endian.
         crc: u32,
@@ -161,31 +161,31 @@ pub struct Faults(pub u16);
 impl Faults {
     /// No fault.
     pub const NONE: Self = Self(0);
-    /// No slot holds a genome to run; the built-in one is in use.
+    /// No slot holds a genome to run; the built-in genome is in use.
     pub const NO_GENOME: Self = Self(1);
-    /// A genome that was written can no longer be run.
+    /// A stored genome can no longer be run.
     pub const SLOT_DAMAGED: Self = Self(1 << 1);
     /// The flash has reported an error.
     pub const FLASH: Self = Self(1 << 2);
-    /// The latest neighbour data is too old; the robot stands.
+    /// The latest neighbour data is too old; the robot has stopped.
     pub const NEIGHBOURS_STALE: Self = Self(1 << 3);
     /// The watchdog caused the last restart.
     pub const WATCHDOG: Self = Self(1 << 4);
 
-    /// All faults of both.
+    /// Returns the union of both sets of faults.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// Returns whether these include all of `other`.
+    /// Returns true if these faults include all of `other`.
     #[must_use]
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 }
 
-/// What one step decided.
+/// Result of one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Stepped {
@@ -195,81 +195,82 @@ pub struct Stepped {
     pub surprise: Surprise,
 }
 
-/// What a robot has done since its start or the last reset.
+/// Status of a robot and its activity since its start or the last reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Report {
-    /// Whether the control loop runs.
+    /// True if the control loop runs.
     pub running: bool,
-    /// Bits mispredicted, of all seen.
+    /// Counts of mispredicted and sensed bits.
     pub surprise: Surprise,
-    /// Steps that decided to go straight.
+    /// Number of steps that decided to go straight.
     pub straight: u32,
-    /// Of these, steps that the guard held back because the cell ahead was occupied.
+    /// Number of these steps that the guard prevented because the cell ahead was occupied.
     pub held_back: u32,
-    /// Steps that decided to turn left.
+    /// Number of steps that decided to turn left.
     pub turned_left: u32,
-    /// Steps that decided to turn right.
+    /// Number of steps that decided to turn right.
     pub turned_right: u32,
     /// Current faults.
     pub faults: Faults,
 }
 
-/// What has arrived at the robot since its start. Counters saturate.
+/// Counts of the data that has arrived at the robot since its start. Counters saturate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineCounters {
-    /// Requests carried out or refused.
+    /// Number of requests executed or refused.
     pub accepted: u32,
-    /// Repeated requests: answered again, but not carried out again.
+    /// Number of repeated requests: the reply was sent again, but the request not executed again.
     pub repeated: u32,
-    /// Requests that arrived too late or belong to no open session; not carried out.
+    /// Number of requests that arrived too late or belong to no open session; not executed.
     pub stale: u32,
-    /// Frames with a correct CRC that are not a request of this protocol.
+    /// Number of frames with a correct CRC that are not a request of this protocol.
     pub malformed: u32,
-    /// Frames with a wrong CRC.
+    /// Number of frames with a wrong CRC.
     pub bad_crc: u32,
     /// Number of byte sequences between two zeros that are not a frame: damaged, truncated or too
     /// long.
     pub no_frame: u32,
 }
 
-/// Why a request was not carried out. Nothing has changed, unless the variant says so.
+/// Reason why a request was not executed. Unless stated for a variant, nothing has changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
-    /// The robot does not know this session: it was restarted, or another host talks to it.
+    /// The session is unknown: the robot was restarted, or a different host uses the line.
     #[error("the robot has lost the session: it was restarted, or another program talks to it")]
     NoSession,
-    /// Stop the robot first.
+    /// The robot must be stopped first.
     #[error("the robot is running; stop it first")]
     Running,
     /// No update has begun.
     #[error("no genome is being written")]
     NotBegun,
-    /// Chunks must arrive in order.
-    #[error("the robot expects the bytes from {expected} on")]
+    /// The chunk is out of order.
+    #[error("the robot expects the bytes from offset {expected} onwards")]
     WrongOffset {
-        /// Bytes that it has.
+        /// Number of bytes received so far.
         expected: u16,
     },
-    /// No container has this length.
+    /// The length is not valid for a container.
     #[error("the robot has no room for a genome of that length")]
     ImpossibleLength,
-    /// More or fewer bytes than the length announced.
-    #[error("the genome's length is not the one announced")]
+    /// The container is longer or shorter than the stated length.
+    #[error("the genome's length differs from the stated length")]
     OtherLength,
-    /// The container is not the one announced, or this robot cannot run it. The update is over.
+    /// The container does not match the stated CRC, or this robot cannot run it. The update is
+    /// aborted.
     #[error("the robot has received a genome that it cannot run")]
     BadGenome,
-    /// The flash reports an error, or does not hold what was written. The update is over.
+    /// The flash reports an error, or does not hold the bytes written. The update is aborted.
     #[error("the robot's flash has failed")]
     Flash,
-    /// This robot cannot do that.
+    /// This robot does not support the request.
     #[error("the robot cannot do that")]
     Unsupported,
-    /// The slots' write count has reached its maximum. Firmware older than this variant answers
-    /// [`Refusal::Flash`].
+    /// The slots' write count has reached its maximum. Firmware older than this variant replies
+    /// with [`Refusal::Flash`].
     #[error(
         "the robot's write count has reached its maximum, so it accepts no more genomes over \
          the line; erase both of its genome slots with a debug probe to restart the count at 1"
@@ -277,29 +278,29 @@ pub enum Refusal {
     CountExhausted,
 }
 
-/// A frame with a correct CRC that is not a message of this protocol.
+/// Reason why a frame with a correct CRC is not a message of this protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MalformedMessage {
-    /// Another version of the protocol.
+    /// The message has a different protocol version.
     #[error("protocol version {found}; this program speaks version {PROTOCOL_VERSION}")]
     OtherVersion {
         /// The first byte of the message.
         found: u8,
     },
-    /// A request where a reply is expected, or a reply where a request is.
+    /// A request arrived instead of a reply, or a reply instead of a request.
     #[error("a message in the wrong direction")]
     WrongWay,
-    /// Not a message, or one with bytes left over or a chunk that is too long.
+    /// The bytes are not a message, surplus bytes follow it, or its chunk is too long.
     #[error("not a message of this protocol")]
     NotAMessage,
 }
 
-/// Reads a request.
+/// Decodes a request.
 ///
 /// # Errors
-/// [`MalformedMessage`].
+/// [`MalformedMessage`] if the payload is not a request of this protocol.
 pub fn decode_request(payload: &[u8]) -> Result<Envelope<Request<'_>>, MalformedMessage> {
     let envelope: Envelope<Request<'_>> = decode(payload, Direction::Request)?;
     match envelope.body {
@@ -312,10 +313,10 @@ pub fn decode_request(payload: &[u8]) -> Result<Envelope<Request<'_>>, Malformed
     }
 }
 
-/// Reads a reply.
+/// Decodes a reply.
 ///
 /// # Errors
-/// [`MalformedMessage`].
+/// [`MalformedMessage`] if the payload is not a reply of this protocol.
 pub fn decode_reply(payload: &[u8]) -> Result<Envelope<Reply<'_>>, MalformedMessage> {
     decode(payload, Direction::Reply)
 }

@@ -7,54 +7,57 @@ use crate::message::{
 };
 use minimal_surprise_controller::SensorBits;
 
-/// Carries out requests on the robot. Each function is called once per request, however often the
-/// request arrives. A refused request has changed nothing, unless the [`Refusal`] says so.
+/// Functions that execute the requests on the robot. Each is called once per request, even if the
+/// request arrives several times. Unless stated for the [`Refusal`], a refused request has changed
+/// nothing.
 pub trait Handler {
-    /// Returns who the robot is and what it runs.
+    /// Returns the robot's firmware, genome and status.
     fn identify(&mut self) -> Identity<'_>;
 
-    /// Prepares to receive a container of `length` bytes whose last four are `crc`, little-endian.
+    /// Prepares to receive a container of `length` bytes whose last four bytes are `crc`,
+    /// little-endian.
     ///
     /// # Errors
-    /// [`Refusal::Running`], [`Refusal::ImpossibleLength`], [`Refusal::Flash`].
+    /// [`Refusal::Running`], [`Refusal::ImpossibleLength`] or [`Refusal::Flash`] if the update
+    /// cannot begin.
     fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal>;
 
-    /// Takes the next bytes of the container.
+    /// Writes the next bytes of the container.
     ///
     /// # Errors
-    /// [`Refusal::NotBegun`], [`Refusal::WrongOffset`], [`Refusal::OtherLength`],
-    /// [`Refusal::Flash`].
+    /// [`Refusal::NotBegun`], [`Refusal::WrongOffset`], [`Refusal::OtherLength`] or
+    /// [`Refusal::Flash`] if the bytes cannot be written.
     fn chunk(&mut self, offset: u16, data: &[u8]) -> Result<(), Refusal>;
 
-    /// Checks the genome and puts it in use; returns the write count.
+    /// Checks the genome and switches to it; returns the write count.
     ///
     /// # Errors
-    /// [`Refusal::NotBegun`], [`Refusal::OtherLength`], [`Refusal::BadGenome`],
-    /// [`Refusal::Flash`].
+    /// [`Refusal::NotBegun`], [`Refusal::OtherLength`], [`Refusal::BadGenome`] or
+    /// [`Refusal::Flash`] if the genome cannot be committed.
     fn commit(&mut self) -> Result<u32, Refusal>;
 
-    /// One control step with these readings, without moving.
+    /// Runs one control step with these readings, without moving.
     ///
     /// # Errors
-    /// [`Refusal::Running`].
+    /// [`Refusal::Running`] if the robot is running.
     fn step(&mut self, sensors: SensorBits) -> Result<Stepped, Refusal>;
 
-    /// Resets the controller's state to that at the start.
+    /// Resets the controller's state to its initial value.
     ///
     /// # Errors
-    /// [`Refusal::Running`].
+    /// [`Refusal::Running`] if the robot is running.
     fn reset(&mut self) -> Result<(), Refusal>;
 
-    /// Starts the control loop; a running robot continues.
+    /// Starts the control loop; no effect on a running robot.
     ///
     /// # Errors
-    /// [`Refusal::Unsupported`].
+    /// [`Refusal::Unsupported`] if the robot does not support the request.
     fn start(&mut self) -> Result<(), Refusal>;
 
-    /// Stops motors and control loop; a stopped robot stays stopped.
+    /// Stops motors and control loop; no effect on a stopped robot.
     ///
     /// # Errors
-    /// [`Refusal::Unsupported`].
+    /// [`Refusal::Unsupported`] if the robot does not support the request.
     fn stop(&mut self) -> Result<(), Refusal>;
 
     /// Returns a status report.
@@ -62,7 +65,7 @@ pub trait Handler {
 }
 
 /// The robot's end of the line: takes bytes, returns bytes, and ensures that every request is
-/// carried out once.
+/// executed once.
 ///
 /// ```
 /// use minimal_surprise_link::{Client, Request, Server};
@@ -100,7 +103,7 @@ struct Conversation {
     last: (u32, u32),
     /// The reply to the last request, as sent.
     reply: Wire<WIRE_BYTES_MAX>,
-    /// The answer to a request of no open session.
+    /// The reply to a request of no open session.
     no_session: Wire<24>,
     counters: LineCounters,
 }
@@ -112,14 +115,14 @@ struct Wire<const N: usize> {
     length: usize,
 }
 
-/// Which of the two answers to send.
+/// Selection of the reply to send.
 enum Answer {
     Reply,
     NoSession,
 }
 
 impl Server {
-    /// A server without a session.
+    /// Creates a server without a session.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -142,8 +145,8 @@ impl Server {
         }
     }
 
-    /// Takes one byte from the line. If the byte completes a request, carries it out and returns
-    /// the bytes to send.
+    /// Takes one byte from the line. If the byte completes a request, executes it and returns the
+    /// bytes to send.
     pub fn feed(&mut self, byte: u8, handler: &mut impl Handler) -> Option<&[u8]> {
         if !self.decoder.feed(byte) {
             return None;
@@ -160,7 +163,7 @@ impl Server {
         }
     }
 
-    /// Returns what has arrived so far.
+    /// Returns the counts of received data.
     #[must_use]
     pub fn counters(&self) -> LineCounters {
         let errors = self.decoder.errors();
@@ -190,7 +193,7 @@ impl Conversation {
             session, sequence, ..
         } = *request;
         if self.session != Some(session) {
-            // Number 0 is always an identification.
+            // Request 0 always identifies the robot.
             if sequence > 0 || self.session_before == Some(session) {
                 count(&mut self.counters.stale);
                 let refused = Reply::Refused(Refusal::NoSession);
@@ -250,7 +253,7 @@ fn carry_out<'h>(
     reply.unwrap_or_else(Reply::Refused)
 }
 
-/// The longest start of a text that has at most `max` bytes and only whole characters.
+/// Returns the longest prefix of a text that has at most `max` bytes and only whole characters.
 fn front(text: &str, max: usize) -> &str {
     text.get(..text.floor_char_boundary(max)).unwrap_or("")
 }
@@ -271,7 +274,7 @@ impl<const N: usize> Wire<N> {
             sequence,
             body,
         };
-        // Every reply fits: texts are truncated, everything else has a maximum size.
+        // Every reply fits: texts are truncated; all other fields have a maximum size.
         self.length = encode(&envelope, &mut self.bytes).unwrap_or(0);
     }
 

@@ -1,8 +1,8 @@
-//! The line between robot and host: whatever arrives, nothing invalid is accepted, no request is
-//! carried out twice, and a genome gets through.
+//! The line between robot and host: whatever bytes arrive, nothing invalid is accepted, no request
+//! is executed twice, and a genome is transferred.
 //!
-//! 100,000 fuzzed frames, a million with `TEST_ALL=1`. `LINK_SEED` replaces the seed, which a
-//! failure prints.
+//! The tests use 100,000 fuzzed frames, or a million with `TEST_ALL=1`. `LINK_SEED` replaces the
+//! seed, which a failure prints.
 
 use minimal_surprise_controller::codec::{
     CONTAINER_BYTES_MAX, Provenance, encode as encode_genome,
@@ -28,7 +28,7 @@ use std::collections::VecDeque;
 /// Default seed; `LINK_SEED` overrides it.
 const SEED: u64 = 11;
 
-/// Prints how to repeat a failed test.
+/// Prints the command that repeats a failed test.
 struct Replay {
     test: &'static str,
     seed: u64,
@@ -50,13 +50,13 @@ impl Drop for Replay {
         if std::thread::panicking() {
             let Self { test, seed } = self;
             eprintln!(
-                "again: LINK_SEED={seed} cargo test -p minimal-surprise-link --test link {test}"
+                "to repeat: LINK_SEED={seed} cargo test -p minimal-surprise-link --test link {test}"
             );
         }
     }
 }
 
-/// Uniform enough for a test, below `end`.
+/// Draws a number below `end`, uniform enough for a test.
 fn below(rng: &mut ChaCha8Rng, end: usize) -> usize {
     ((u64::from(rng.next_u32()) * end as u64) >> 32) as usize
 }
@@ -91,7 +91,7 @@ fn reply(sequence: u32, body: Reply<'_>) -> Envelope<Reply<'_>> {
     }
 }
 
-/// CRC-32C, bit by bit, as it is defined.
+/// Computes CRC-32C bit by bit, as defined.
 fn crc_32c(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0, |crc: u32, &byte| {
         (0..8).fold(crc ^ u32::from(byte), |crc, _| {
@@ -101,7 +101,7 @@ fn crc_32c(bytes: &[u8]) -> u32 {
     })
 }
 
-/// COBS, written from the paper that introduced it.
+/// Encodes a message with COBS, implemented from the paper that introduced it.
 fn reference_cobs(message: &[u8]) -> Vec<u8> {
     let mut wire = vec![0];
     for (index, block) in message.split(|&byte| byte == 0).enumerate() {
@@ -113,7 +113,7 @@ fn reference_cobs(message: &[u8]) -> Vec<u8> {
     wire
 }
 
-/// The message of a stretch of bytes without zeros, if it is a frame.
+/// Decodes bytes without zeros; returns their message if they are a frame.
 fn reference_decode(stretch: &[u8]) -> Option<Vec<u8>> {
     let mut rest = stretch;
     let mut frame = Vec::new();
@@ -130,7 +130,7 @@ fn reference_decode(stretch: &[u8]) -> Option<Vec<u8>> {
     (fits && u32::from_le_bytes(*crc) == crc_32c(payload)).then(|| payload.to_vec())
 }
 
-/// A message as a frame with a correct CRC.
+/// Encodes a message as a frame with a correct CRC.
 fn frame_of(payload: &[u8]) -> Vec<u8> {
     let crc = crc_32c(payload).to_le_bytes();
     reference_cobs(&[payload, &crc[..]].concat())
@@ -159,10 +159,10 @@ fn mutate(bytes: &mut Vec<u8>, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Records what it was asked to do.
+/// Handler that records the requests received.
 #[derive(Default)]
 struct Recorder {
-    /// `crc` of every request to begin.
+    /// `crc` of every `begin` request.
     begun: Vec<u32>,
     calls: u64,
 }
@@ -215,7 +215,7 @@ impl Handler for Recorder {
     }
 }
 
-/// Feeds all bytes; returns the frames that come back.
+/// Feeds all bytes; returns the frames sent in reply.
 fn feed(server: &mut Server, handler: &mut impl Handler, bytes: &[u8]) -> Vec<Vec<u8>> {
     let answers = bytes.iter().filter_map(|&byte| {
         let answer = server.feed(byte, handler)?;
@@ -233,16 +233,16 @@ fn fuzzed_frames_are_accepted_if_and_only_if_they_are_frames() {
     let mut client = Client::new(1, 1);
     client.request(&Request::Identify).unwrap();
     let (mut server, mut handler) = (Server::new(), Recorder::default());
-    // What has arrived since the last zero.
+    // The bytes received since the last zero.
     let mut stretch = Vec::new();
     // Messages that may arrive intact: those of the last eight frames, and their mutants. A frame
-    // that has lost its end is pending until the next zero.
+    // that has lost its last bytes is pending until the next zero.
     let mut known: VecDeque<Vec<u8>> = VecDeque::from(vec![vec![]; 16]);
     let mut earlier = Vec::new();
     let (mut accepted, mut well_formed) = (0_u64, 0_u64);
     for number in 0..frames {
         let data = any_bytes(&mut rng, CHUNK_BYTES_MAX + 1);
-        // A session stays open for a while; some frames belong to no session.
+        // A session stays open for some frames; some frames belong to no session.
         let [session, sequence] = match below(&mut rng, 8) {
             0 => [0; 2].map(|_: i32| rng.next_u32() >> below(&mut rng, 32)),
             _ => [number as u32 / 32, number as u32 % 32],
@@ -273,9 +273,9 @@ fn fuzzed_frames_are_accepted_if_and_only_if_they_are_frames() {
         match below(&mut rng, 8) {
             0 => {}
             1 => wire = any_bytes(&mut rng, 200),
-            // Sent twice, or repeated later.
+            // The frame is sent twice, or an earlier frame is repeated.
             4 => wire = [&wire, &earlier, &wire[..]].concat(),
-            // A frame by definition, but not necessarily a message.
+            // By definition a frame, but not necessarily a message.
             2 => {
                 mutate(&mut payload, &mut rng);
                 payload.truncate(FRAME_BYTES_MAX - 4);
@@ -361,17 +361,17 @@ fn repeated_and_late_requests_among_garbage_are_carried_out_once_and_in_order() 
             }
             1 => {
                 let again = feed(&mut server, &mut handler, &sent[last]);
-                assert_eq!(again, answer, "the same answer again");
+                assert_eq!(again, answer, "the same reply again");
                 expected.repeated += 1;
             }
             2 if last > 0 => {
                 let late = below(&mut rng, last);
                 let nothing = feed(&mut server, &mut handler, &sent[late]);
-                assert!(nothing.is_empty(), "a late request is not answered");
+                assert!(nothing.is_empty(), "a late request gets no reply");
                 expected.stale += 1;
             }
             3 => {
-                // Another request with a number already used.
+                // A different request with a number that was already used.
                 let other = wire_of(&request(session, last as u32, Request::Identify));
                 if other != sent[last] {
                     assert!(feed(&mut server, &mut handler, &other).is_empty());
@@ -469,11 +469,11 @@ impl Simulation {
             let arrived: Vec<u8> = self.to_host.on_the_way.drain(..).flatten().collect();
             for byte in arrived {
                 if let Some(reply) = self.client.feed(byte) {
-                    // The rest of this delivery belongs to earlier requests.
+                    // The rest of the bytes delivered belongs to earlier requests.
                     return check(reply);
                 }
             }
-            let again = self.client.timed_out().expect("it gets through some day");
+            let again = self.client.timed_out().expect("the request gets through");
             let again = again.to_vec();
             self.to_robot.send(&again, &mut self.rng);
         }
@@ -525,7 +525,7 @@ fn a_genome_gets_through_an_unreliable_line_and_is_written_once() {
             assert_eq!(reply, Reply::Committed { write_count: 1 });
         });
 
-        // It runs, and every step is carried out once.
+        // The new genome runs, and every step is executed once.
         let decoded = EncodedGenome::decode(&genome).unwrap();
         let controller = Controller::from_encoded(&decoded);
         let mut state = State::new(&controller);
@@ -558,11 +558,11 @@ fn a_genome_gets_through_an_unreliable_line_and_is_written_once() {
         let mut robot = LinkRobot::start(flash);
         match robot.slots.in_use(&mut Buffer::new()) {
             InUse::Slot { genome, .. } => assert_eq!(genome, decoded, "run {run}"),
-            InUse::BuiltIn => panic!("run {run}: it was acknowledged"),
+            InUse::BuiltIn => panic!("run {run}: the update was acknowledged"),
         }
     }
     println!("{runs} genomes written: {needed} requests needed {frames_sent} frames");
-    assert!(frames_sent > needed * 5 / 4, "the line was not bad enough");
+    assert!(frames_sent > needed * 5 / 4, "the line lost too few frames");
 }
 
 #[test]
@@ -635,7 +635,7 @@ fn clients_take_only_the_reply_to_their_pending_request() {
     );
     let done = wire_of(&reply(0, Reply::Done));
     assert_eq!(take(&mut client, &done), Some("Done".into()));
-    assert_eq!(take(&mut client, &done), None, "it is not pending any more");
+    assert_eq!(take(&mut client, &done), None, "the request is not pending any more");
 
     let first = client.request(&Request::Stop).unwrap().to_vec();
     assert_eq!(client.timed_out(), Ok(&first[..]));
@@ -676,7 +676,7 @@ fn a_client_counts_invalid_frames_by_kind() {
     let last = wrong_crc.len() - 2;
     wrong_crc[last] ^= 0x40;
     let too_long = reference_cobs(&[1; FRAME_BYTES_MAX + 1]);
-    // A block that ends before its length, and a frame without a message.
+    // A block that ends before its stated length, and a frame without a message.
     let cut_off = vec![0, 5, 1, 0];
     let empty = reference_cobs(&crc_32c(&[]).to_le_bytes());
     for (wires, bad_crc, no_frame) in [
@@ -891,7 +891,7 @@ fn the_longest_messages_fit_a_frame() {
     assert!(client.request(&Request::Chunk { offset, data }).is_ok());
 }
 
-/// The bytes of a message without CRC and COBS, in hexadecimal.
+/// Formats the bytes of a message without CRC and COBS, in hexadecimal.
 fn hex(bytes: &[u8]) -> String {
     let bytes: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
     bytes.join(" ")

@@ -3,7 +3,7 @@
 use minimal_surprise_controller::DecodeError;
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 
-/// Two slots cannot be placed there.
+/// Error for a place that cannot hold two slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -11,54 +11,54 @@ pub enum PlaceError {
     /// The offset is not aligned to the chip's erase units.
     #[error("slots at {offset}: not a multiple of the {erase_size} bytes erased at a time")]
     NotAligned {
-        /// The byte address asked for.
+        /// The byte address requested.
         offset: u32,
-        /// Bytes that the chip erases at a time.
+        /// Number of bytes that the chip erases at a time.
         erase_size: usize,
     },
     /// The second slot does not fit into the flash.
     #[error("two slots of {slot_bytes} bytes at {offset} do not fit a flash of {capacity}")]
     OutOfBounds {
-        /// The byte address asked for.
+        /// The byte address requested.
         offset: u32,
-        /// Bytes of one slot.
+        /// Size of one slot, in bytes.
         slot_bytes: usize,
-        /// Bytes of the flash.
+        /// Size of the flash, in bytes.
         capacity: usize,
     },
 }
 
-/// A slot was committed, but its genome cannot be run.
+/// Reason why the genome of a committed slot cannot be run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Defect {
     /// The flash reports an error when it is read.
     #[error("the flash cannot be read")]
     Unreadable,
-    /// The container is not the one that was announced.
-    #[error("the container's CRC-32C is {found:08x}; {announced:08x} was announced")]
+    /// The container does not match the CRC in the header.
+    #[error("the container's CRC-32C is {found:08x}; the header states {announced:08x}")]
     OtherContainer {
         /// The container's last four bytes, little-endian.
         found: u32,
-        /// What the header says.
+        /// The CRC in the header.
         announced: u32,
     },
-    /// The container is not a genome that this controller runs.
+    /// The container is not a genome that this controller can run.
     #[error(transparent)]
     Refused(#[from] DecodeError),
 }
 
-/// An update failed. The genome in use stays in use, also after a restart.
+/// Error of an update. The genome in use stays in use, also after a restart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum UpdateError<E: core::fmt::Debug> {
-    /// The chip reports an error. The update is over; begin again.
+    /// The chip reports an error. The update is aborted; begin a new one.
     #[error("flash error: {0:?}")]
     Flash(E),
-    /// No container has this length.
+    /// The length is not valid for a container.
     #[error("a container of {found} bytes; containers have 1 to {CONTAINER_BYTES_MAX}")]
     ImpossibleLength {
-        /// The length announced.
+        /// The length stated at the start of the update.
         found: usize,
     },
     /// The write count has reached its maximum, after 2³² − 1 updates.
@@ -67,34 +67,34 @@ pub enum UpdateError<E: core::fmt::Debug> {
     /// No update is in progress.
     #[error("no update has begun")]
     NotBegun,
-    /// Chunks must arrive in order, without gaps. The update continues.
+    /// The chunk is out of order or leaves a gap. The update continues.
     #[error("a chunk for offset {found}; the next one starts at {expected}")]
     WrongOffset {
         /// Offset of the chunk, in bytes.
         found: u16,
-        /// Bytes received so far.
+        /// Number of bytes received so far.
         expected: u16,
     },
-    /// The chunk exceeds the length announced. The update continues.
-    #[error("{excess} bytes beyond the {length} announced")]
+    /// The chunk exceeds the stated length. The update continues.
+    #[error("{excess} bytes beyond the stated length of {length}")]
     TooMuch {
         /// Number of surplus bytes.
         excess: usize,
-        /// The length announced.
+        /// The length stated at the start of the update.
         length: u16,
     },
     /// The container is incomplete. The update continues.
     #[error("{taken} of {length} bytes have arrived")]
     Incomplete {
-        /// Bytes received so far.
+        /// Number of bytes received so far.
         taken: u16,
-        /// The length announced.
+        /// The length stated at the start of the update.
         length: u16,
     },
-    /// The flash does not hold what was written. The update is over; begin again.
+    /// The bytes read back differ from those written. The update is aborted; begin a new one.
     #[error("the flash does not hold what was written")]
     NotWritten,
-    /// The flash does not hold a genome that can be run. The update is over.
+    /// The flash does not hold a genome that can be run. The update is aborted.
     #[error(transparent)]
     Defect(#[from] Defect),
 }

@@ -2,31 +2,32 @@
 
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, CRC_32C};
 
-/// Everything in a slot starts at a multiple of this many bytes, so that the layout is the same
-/// for every chip: words may have 1, 2, 4, 8, 16 or 32 bytes.
+/// Alignment of every part of a slot, in bytes. The layout is the same for every chip: words may
+/// have 1, 2, 4, 8, 16 or 32 bytes.
 pub const BLOCK_BYTES: usize = 32;
 /// Offset of the commit record in a slot, in bytes. The header is at 0.
 pub const COMMIT_AT: u32 = BLOCK_BYTES as u32;
 /// Offset of the genome container in a slot, in bytes.
 pub const CONTAINER_AT: u32 = 2 * BLOCK_BYTES as u32;
-/// Bytes that the longest container takes, for any word size.
+/// Space reserved for the container in a slot, in bytes, for any word size.
 pub const ROOM_BYTES: usize = CONTAINER_BYTES_MAX.next_multiple_of(BLOCK_BYTES);
-/// Bytes of a slot, before rounding up to whole erase units.
+/// Size of a slot in bytes, before rounding up to whole erase units.
 pub const SLOT_BYTES_MIN: usize = CONTAINER_AT as usize + ROOM_BYTES;
-/// Largest write count for a slot that is made outside the robot: it leaves 2²⁴ updates, more than
-/// any flash endures.
+/// Largest write count for a slot that is written outside the robot: it leaves 2²⁴ updates, more
+/// than any flash endures.
 pub const MADE_WRITE_COUNT_MAX: u32 = u32::MAX - (1 << 24);
 /// First bytes of a slot; the last one is the version of the layout.
 pub const MAGIC: [u8; 4] = *b"MSS1";
 
-/// One block as it is in flash.
+/// One block, as stored in flash.
 pub(crate) type Block = [u8; BLOCK_BYTES];
-/// What erased flash reads as.
+/// A block of erased flash.
 pub(crate) const ERASED: Block = [0xff; BLOCK_BYTES];
 
-/// Bytes of a slot in a chip that erases `erase_size` bytes at a time; a multiple of `erase_size`.
+/// Returns the size of a slot in bytes, for a chip that erases `erase_size` bytes at a time; a
+/// multiple of `erase_size`.
 ///
-/// The two slots are adjacent, so the chip needs twice as much.
+/// The two slots are adjacent, so the chip needs twice this size.
 #[must_use]
 pub const fn slot_bytes(erase_size: usize) -> usize {
     SLOT_BYTES_MIN.next_multiple_of(erase_size)
@@ -36,16 +37,17 @@ pub const fn slot_bytes(erase_size: usize) -> usize {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// Number of the genome among all written so far, counted from 1; the larger is newer.
+    /// Number of the genome among all genomes written so far, counted from 1; a larger number is
+    /// newer.
     pub write_count: u32,
-    /// Bytes of the container, 1 to [`CONTAINER_BYTES_MAX`].
+    /// Length of the container in bytes, 1 to [`CONTAINER_BYTES_MAX`].
     pub length: u16,
     /// The container's last four bytes, little-endian: its own CRC-32C.
     pub crc: u32,
 }
 
 impl Header {
-    /// The header's block; unused bytes stay erased.
+    /// Returns the header's block; unused bytes stay erased.
     pub(crate) fn to_block(self) -> Block {
         let [m0, m1, m2, m3] = MAGIC;
         let [n0, n1, n2, n3] = self.write_count.to_le_bytes();
@@ -57,8 +59,8 @@ impl Header {
         block_of(header)
     }
 
-    /// The bytes before the container in a committed slot: the header and its commit record. For
-    /// programs that write a whole slot at once.
+    /// Returns the bytes before the container in a committed slot: the header and its commit
+    /// record. For programs that write a whole slot at once.
     #[must_use]
     pub fn front(self) -> [u8; CONTAINER_AT as usize] {
         let mut front = [0xff; CONTAINER_AT as usize];
@@ -69,7 +71,7 @@ impl Header {
         front
     }
 
-    /// The header in a block, if there is one.
+    /// Parses the header in a block; `None` if the block does not contain a header.
     pub(crate) fn from_block(block: &Block) -> Option<Self> {
         let (magic, rest) = block.split_first_chunk()?;
         let (write_count, rest) = rest.split_first_chunk()?;
@@ -85,8 +87,8 @@ impl Header {
         (*magic == MAGIC && lengths.contains(&usize::from(length))).then_some(header)
     }
 
-    /// The block of the commit record for this header: a CRC-32C of the header, and its complement,
-    /// so that erased flash is never a commit record.
+    /// Returns the block of the commit record for this header: a CRC-32C of the header, and its
+    /// complement, so that erased flash is never a commit record.
     pub(crate) fn commit_block(self) -> Block {
         let header = self.to_block();
         let (fields, _) = header.split_at(HEADER_BYTES);
@@ -96,22 +98,22 @@ impl Header {
     }
 }
 
-/// Bytes of the header's fields.
+/// Size of the header's fields, in bytes.
 const HEADER_BYTES: usize = 16;
-/// Bytes of the commit record.
+/// Size of the commit record, in bytes.
 const COMMIT_BYTES: usize = 8;
 
-/// Bytes of the header in flash, in words of `word` bytes.
+/// Returns the size of the header in flash, in bytes, for words of `word` bytes.
 pub(crate) const fn header_bytes(word: usize) -> usize {
     HEADER_BYTES.next_multiple_of(word)
 }
 
-/// Bytes of the commit record in flash, in words of `word` bytes.
+/// Returns the size of the commit record in flash, in bytes, for words of `word` bytes.
 pub(crate) const fn commit_bytes(word: usize) -> usize {
     COMMIT_BYTES.next_multiple_of(word)
 }
 
-/// An erased block that starts with the given bytes.
+/// Creates an erased block that starts with the given bytes.
 fn block_of<const N: usize>(bytes: [u8; N]) -> Block {
     let mut block = ERASED;
     for (place, byte) in block.iter_mut().zip(bytes) {
@@ -142,7 +144,7 @@ mod tests {
         assert_eq!(HEADER.front().as_slice(), [header, commit].concat());
     }
 
-    /// Computed by another program.
+    /// Commit record computed by a different program.
     const COMMIT: [u8; 8] = [0x96, 0x80, 0xce, 0xd7, 0x69, 0x7f, 0x31, 0x28];
 
     #[test]

@@ -27,13 +27,14 @@ use layout::{Block, ERASED, commit_bytes, header_bytes};
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_controller::{Controller, EncodedGenome, Prediction, SensorModel, Topology};
 
-/// Topology of the built-in controller: model C, everything predicted by the network.
+/// Topology of the built-in controller: model C; the network predicts every sensor.
 pub const BUILT_IN_TOPOLOGY: Topology = match Topology::new(SensorModel::C, Prediction::Free) {
     Ok(topology) => topology,
     Err(_) => panic!("model C exists"),
 };
 
-/// The controller of a robot without a genome: whatever it senses, it turns clockwise on the spot.
+/// Returns the controller of a robot without a genome: it turns clockwise on the spot, whatever it
+/// senses.
 #[must_use]
 pub fn built_in_controller() -> Controller {
     Controller::zeroed(BUILT_IN_TOPOLOGY)
@@ -43,17 +44,17 @@ pub fn built_in_controller() -> Controller {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Slot {
-    /// The one at the lower address.
+    /// The slot at the lower address.
     First,
-    /// The one at the higher address.
+    /// The slot at the higher address.
     Second,
 }
 
 impl Slot {
-    /// Both, in order of their addresses.
+    /// Both slots, in the order of their addresses.
     pub const ALL: [Self; 2] = [Self::First, Self::Second];
 
-    /// The other one.
+    /// Returns the other slot.
     #[must_use]
     pub const fn other(self) -> Self {
         match self {
@@ -62,7 +63,7 @@ impl Slot {
         }
     }
 
-    /// 0 or 1.
+    /// Returns 0 for the first slot and 1 for the second.
     #[must_use]
     pub const fn index(self) -> u8 {
         match self {
@@ -72,15 +73,15 @@ impl Slot {
     }
 }
 
-/// What was found in a slot.
+/// Contents of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SlotState {
-    /// Nothing: header and commit record read as erased.
+    /// No contents: header and commit record read as erased.
     Empty,
-    /// An update that was never committed. Harmless.
+    /// An update that was never committed. Not a fault.
     Unfinished,
-    /// A committed genome. That of the slot in use has been checked.
+    /// A committed genome. The genome of the slot in use has been checked.
     Committed(Header),
     /// A committed genome that cannot be run. A fault.
     Damaged(Header, Defect),
@@ -90,7 +91,7 @@ pub enum SlotState {
 }
 
 impl SlotState {
-    /// The header of a slot that was committed.
+    /// Returns the header of a slot that was committed.
     fn header(self) -> Option<Header> {
         match self {
             Self::Committed(header) | Self::Damaged(header, _) => Some(header),
@@ -98,31 +99,31 @@ impl SlotState {
         }
     }
 
-    /// 0 if nothing was committed.
+    /// Returns the write count; 0 if nothing was committed.
     fn write_count(self) -> u32 {
         self.header().map_or(0, |header| header.write_count)
     }
 }
 
-/// What the robot must run.
+/// The genome that the robot must run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum InUse<'a> {
     /// The newest genome.
     Slot {
-        /// Where it is.
+        /// The slot that holds the genome.
         slot: Slot,
-        /// What its header says.
+        /// The header of the slot.
         header: Header,
         /// The genome.
         genome: EncodedGenome<'a>,
     },
-    /// [`built_in_controller`], because there is no genome. A fault to report.
+    /// [`built_in_controller`], because no slot holds a genome that can be run. A fault to report.
     BuiltIn,
 }
 
 impl InUse<'_> {
-    /// The controller to run.
+    /// Returns the controller to run.
     #[must_use]
     pub fn controller(&self) -> Controller {
         match self {
@@ -137,7 +138,7 @@ impl InUse<'_> {
 struct Update {
     slot: Slot,
     header: Header,
-    /// Bytes of the container that have arrived.
+    /// Number of bytes of the container received so far.
     taken: u16,
     /// The bytes that do not fill a block yet; the rest of the block is erased.
     block: Block,
@@ -172,13 +173,13 @@ pub struct Slots<F> {
     offset: u32,
     states: [SlotState; 2],
     in_use: Option<(Slot, Header)>,
-    /// The largest write count seen or given.
+    /// The largest write count found or assigned.
     write_count: u32,
     update: Option<Update>,
 }
 
 impl<F: NorFlash> Slots<F> {
-    /// Bytes of one slot of this chip.
+    /// Size of one slot of this chip, in bytes.
     pub const SLOT_BYTES: usize = slot_bytes(F::ERASE_SIZE);
 
     /// Words must divide blocks and erase units; other chips are rejected at compile time.
@@ -242,7 +243,7 @@ impl<F: NorFlash> Slots<F> {
         Ok(slots)
     }
 
-    /// The genome to run, and where it comes from. Reads and checks the container again.
+    /// Returns the genome to run and its slot. Reads and checks the container again.
     pub fn in_use<'a>(&'a mut self, room: &'a mut impl Room<F>) -> InUse<'a> {
         let Some((slot, header)) = self.in_use else {
             return InUse::BuiltIn;
@@ -258,13 +259,13 @@ impl<F: NorFlash> Slots<F> {
         }
     }
 
-    /// The slot in use and its header; `None` if the built-in controller is in use.
+    /// Returns the slot in use and its header; `None` if the built-in controller is in use.
     #[must_use]
     pub fn newest(&self) -> Option<(Slot, Header)> {
         self.in_use
     }
 
-    /// The current state of a slot.
+    /// Returns the current state of a slot.
     #[must_use]
     pub fn state(&self, slot: Slot) -> SlotState {
         let [first, second] = self.states;
@@ -274,8 +275,8 @@ impl<F: NorFlash> Slots<F> {
         }
     }
 
-    /// How many genomes have been committed to these slots, as far as the slots can tell: the
-    /// largest write count in them.
+    /// Returns the largest write count in the slots. This is the number of genomes committed to
+    /// these slots, as far as the slots record it.
     #[must_use]
     pub fn write_count(&self) -> u32 {
         self.write_count
@@ -287,12 +288,13 @@ impl<F: NorFlash> Slots<F> {
     }
 
     /// Begins an update: erases the slot that is not in use and writes the header. `crc` is the
-    /// container's last four bytes, little-endian. An update in progress is aborted.
+    /// last four bytes of the container, little-endian. Aborts an update in progress.
     ///
     /// The chip may stall while it erases, for seconds if erase units are large: stop motors first.
     ///
     /// # Errors
-    /// [`UpdateError::ImpossibleLength`], [`UpdateError::CountExhausted`], [`UpdateError::Flash`].
+    /// [`UpdateError::ImpossibleLength`], [`UpdateError::CountExhausted`] or [`UpdateError::Flash`]
+    /// if the update cannot begin.
     pub fn begin(&mut self, length: u16, crc: u32) -> Result<(), UpdateError<F::Error>> {
         self.update = None;
         let found = usize::from(length);
@@ -320,11 +322,11 @@ impl<F: NorFlash> Slots<F> {
         Ok(())
     }
 
-    /// Takes the next bytes of the container; `offset` is the number of bytes before them.
+    /// Writes the next bytes of the container; `offset` is the number of bytes before them.
     ///
     /// # Errors
-    /// [`UpdateError::NotBegun`], [`UpdateError::WrongOffset`], [`UpdateError::TooMuch`],
-    /// [`UpdateError::Flash`].
+    /// [`UpdateError::NotBegun`], [`UpdateError::WrongOffset`], [`UpdateError::TooMuch`] or
+    /// [`UpdateError::Flash`] if the bytes cannot be written.
     pub fn chunk(&mut self, offset: u16, data: &[u8]) -> Result<(), UpdateError<F::Error>> {
         let update = self.update.ok_or(UpdateError::NotBegun)?;
         if offset != update.taken {
@@ -346,12 +348,12 @@ impl<F: NorFlash> Slots<F> {
         Ok(())
     }
 
-    /// Ends the update: reads the container back, checks it and commits it. Returns the write
+    /// Completes the update: reads the container back, checks it and commits it. Returns the write
     /// count. After that, the new genome is in use, also after a restart.
     ///
     /// # Errors
     /// [`UpdateError::NotBegun`], [`UpdateError::Incomplete`], [`UpdateError::NotWritten`],
-    /// [`UpdateError::Defect`], [`UpdateError::Flash`].
+    /// [`UpdateError::Defect`] or [`UpdateError::Flash`] if the genome cannot be committed.
     pub fn commit(&mut self, room: &mut impl Room<F>) -> Result<u32, UpdateError<F::Error>> {
         let update = self.update.ok_or(UpdateError::NotBegun)?;
         let Update {
@@ -378,7 +380,8 @@ impl<F: NorFlash> Slots<F> {
         let at = self.address(slot, COMMIT_AT);
         let commit = header.commit_block();
         let written = self.write_block(at, &commit, commit_bytes(F::WRITE_SIZE));
-        // Only the bytes in flash count, whatever the chip reported: they decide after a restart.
+        // Only the bytes in flash matter, whatever the chip reported: after a restart, only they
+        // are read.
         match self.check_block(at, &commit) {
             Ok(()) => {
                 *self.state_mut(slot) = SlotState::Committed(header);
@@ -390,23 +393,25 @@ impl<F: NorFlash> Slots<F> {
         }
     }
 
-    /// Drops an update in progress, if any.
+    /// Aborts an update in progress, if any.
     pub fn abort(&mut self) {
         self.update = None;
     }
 
-    /// Bytes of the container that have arrived; `None` if no update is in progress.
+    /// Returns the number of bytes of the container received so far; `None` if no update is in
+    /// progress.
     #[must_use]
     pub fn taken(&self) -> Option<u16> {
         self.update.map(|update| update.taken)
     }
 
-    /// Performs a whole update: before anything is erased, refuses bytes that are not a genome that
-    /// can be run; then begins, writes and commits. Returns the write count.
+    /// Performs a whole update. Rejects bytes that are not a genome that can be run before anything
+    /// is erased; then begins, writes and commits. Returns the write count.
     ///
     /// # Errors
     /// [`UpdateError::ImpossibleLength`], [`UpdateError::CountExhausted`],
-    /// [`UpdateError::NotWritten`], [`UpdateError::Defect`], [`UpdateError::Flash`].
+    /// [`UpdateError::NotWritten`], [`UpdateError::Defect`] or [`UpdateError::Flash`] if the genome
+    /// is invalid or cannot be stored.
     pub fn write(
         &mut self,
         bytes: &[u8],
@@ -442,7 +447,7 @@ impl<F: NorFlash> Slots<F> {
         Ok(update)
     }
 
-    /// The slot that is not in use; if none is, the one with the older contents.
+    /// Returns the slot that is not in use; if neither is in use, the slot with the older contents.
     fn slot_to_write(&self) -> Slot {
         let [first, second] = self.states.map(SlotState::write_count);
         match self.in_use {
@@ -497,7 +502,7 @@ impl<F: NorFlash> Slots<F> {
         }
     }
 
-    /// Address in flash of an offset in a slot.
+    /// Returns the address in flash of an offset in a slot.
     fn address(&self, slot: Slot, place: u32) -> u32 {
         let slots_before = u32::from(slot.index());
         self.offset + slots_before * Self::SLOT_BYTES as u32 + place
@@ -531,7 +536,7 @@ fn container<'a, F: NorFlash>(
     }
 }
 
-/// The CRC-32C that a container ends with.
+/// Returns the CRC-32C at the end of a container.
 #[must_use]
 pub fn crc_of(container: &[u8]) -> Option<u32> {
     let crc = container.last_chunk()?;

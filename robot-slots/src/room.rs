@@ -1,23 +1,24 @@
-//! How the bytes of a container are read: into a buffer, or directly from memory-mapped flash.
+//! Ways to read the bytes of a container: into a buffer, or directly from memory-mapped flash.
 
 use crate::layout::ROOM_BYTES;
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 
-/// Provides the bytes of a container that is in flash.
+/// Access to the bytes of a container in flash.
 pub trait Room<F: ReadNorFlash> {
     /// Returns the `length` bytes at `at`, a byte address in flash that is a multiple of its read
-    /// size; `length` is at most that of the longest container. `None` if they cannot be read.
+    /// size. `length` is at most the maximum size of a container. `None` if the bytes cannot be
+    /// read.
     fn container<'a>(&'a mut self, flash: &'a mut F, at: u32, length: usize) -> Option<&'a [u8]>;
 }
 
-/// Memory for one container, 1.3 KB. Make it a `static`, or part of one; it is large for a stack.
+/// Memory for one container, 1.3 KB. Make it a `static`, or part of one: it is large for a stack.
 #[derive(Clone, Debug)]
 pub struct Buffer {
     bytes: [u8; ROOM_BYTES],
 }
 
 impl Buffer {
-    /// An empty buffer.
+    /// Creates an empty buffer.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -42,11 +43,11 @@ impl<F: ReadNorFlash> Room<F> for Buffer {
 
 /// A chip whose flash the processor can address like memory.
 pub trait MappedFlash: NorFlash {
-    /// All of the flash, from its byte address 0 on, as it is now.
+    /// Returns the current contents of the whole flash, starting at its byte address 0.
     fn bytes(&self) -> &[u8];
 }
 
-/// Reads containers in place, without copying them.
+/// Direct access to containers in memory-mapped flash, without copying.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct InPlace;
 

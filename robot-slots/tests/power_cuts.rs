@@ -2,8 +2,8 @@
 //! the recovery.
 //!
 //! A moment is a byte of a write, the end of a write before it is reported, or one of five ways in
-//! which an erase can end. Every first cut is tested, and with `TEST_ALL=1` in a release build
-//! every second cut after each; otherwise a sample of the second cuts.
+//! which an erase can end. Every first cut is tested. With `TEST_ALL=1` in a release build, every
+//! second cut after each first cut is tested too; otherwise, only a sample of the second cuts.
 //! `POWER_CUT=write_size:erase_size:first:second` tests one pair of cuts; a failure prints the
 //! pair.
 
@@ -21,24 +21,24 @@ use robot_support::full::all_cases;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Seed of the genomes.
+/// Seed of the random genomes.
 const SEED: u64 = 5;
-/// The reduced run continues after one in this many first cuts, and then tests one in this many
-/// second cuts.
+/// Strides of the reduced run: it continues after every *n*-th first cut and then tests every
+/// *m*-th second cut.
 const REDUCED: Strides = Strides {
     first: 5,
     second: 601,
 };
-/// Every second cut after every first cut.
+/// Strides of the full run: every second cut after every first cut.
 const ALL: Strides = Strides {
     first: 1,
     second: 1,
 };
 
-/// After one in this many second cuts, the update is repeated to its end.
+/// Stride of the second cuts after which the update is repeated to completion.
 const THIRD_STRIDE: u64 = 16;
 
-/// A genome container that differs from those of other generations in every part.
+/// Creates a genome container that differs in every part from those of other generations.
 fn container(topology: Topology, generation: u32) -> Vec<u8> {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED + u64::from(generation));
     let genome = Genome::random(topology, &mut rng);
@@ -51,7 +51,7 @@ fn container(topology: Topology, generation: u32) -> Vec<u8> {
     encode(&genome, provenance, &mut buffer).unwrap().to_vec()
 }
 
-/// Two containers that differ in topology and length.
+/// Creates two containers that differ in topology and length.
 fn old_and_new() -> [Vec<u8>; 2] {
     [
         container(Topology::ALL[7], 1),
@@ -59,14 +59,14 @@ fn old_and_new() -> [Vec<u8>; 2] {
     ]
 }
 
-/// What the robot runs from the slots.
+/// The genome that the robot runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Runs {
     Old,
     New,
 }
 
-/// The genome before an update, and the new one.
+/// The genomes before and after an update.
 struct Genomes<'a> {
     old_container: &'a [u8],
     new_container: &'a [u8],
@@ -84,7 +84,7 @@ impl<'a> Genomes<'a> {
         }
     }
 
-    /// Restarts the robot and returns what it runs.
+    /// Restarts the robot and returns which genome it runs.
     fn after_restart<const W: usize, const E: usize>(
         &self,
         flash: &mut MockFlash<W, E>,
@@ -95,8 +95,8 @@ impl<'a> Genomes<'a> {
         match slots.in_use(room) {
             InUse::Slot { genome, .. } if genome == self.old => Runs::Old,
             InUse::Slot { genome, .. } if genome == self.new => Runs::New,
-            InUse::Slot { header, .. } => panic!("a genome of another time: {header:?}"),
-            InUse::BuiltIn => panic!("no genome at all: {slots:?}"),
+            InUse::Slot { header, .. } => panic!("neither the old nor the new genome: {header:?}"),
+            InUse::BuiltIn => panic!("no genome: {slots:?}"),
         }
     }
 
@@ -115,7 +115,7 @@ impl<'a> Genomes<'a> {
         slots.commit(room)
     }
 
-    /// A chip with the old genome in one slot and an even older one in the other.
+    /// Creates a chip with the old genome in one slot and an even older genome in the other.
     fn flash<const W: usize, const E: usize>(&self, room: &mut Buffer) -> MockFlash<W, E> {
         let mut flash = MockFlash::<W, E>::new();
         let mut slots = Slots::open(&mut flash, MockFlash::<W, E>::OFFSET, room).unwrap();
@@ -126,7 +126,7 @@ impl<'a> Genomes<'a> {
     }
 }
 
-/// One pair of cuts, printed when it fails.
+/// One pair of cuts, printed if its test fails.
 struct Case {
     write_size: usize,
     erase_size: usize,
@@ -145,21 +145,21 @@ impl Drop for Case {
             } = self;
             let second = self.second.map_or("-".into(), |second| second.to_string());
             eprintln!(
-                "genome seed {SEED}; this case again: \
+                "genome seed {SEED}; to repeat this case: \
                  POWER_CUT={write_size}:{erase_size}:{first}:{second} cargo test -p minimal-surprise-slots --test power_cuts"
             );
         }
     }
 }
 
-/// Which second cuts to test.
+/// Selection of the second cuts to test.
 #[derive(Clone, Copy)]
 struct Strides {
     first: u64,
     second: u64,
 }
 
-/// Which cuts to test.
+/// Selection of the cuts to test.
 #[derive(Clone, Copy)]
 enum Cuts {
     /// Every first cut and some second cuts.
@@ -210,7 +210,7 @@ fn cut_updates<const W: usize, const E: usize>(cuts: Cuts) -> u64 {
         assert_eq!(genomes.after_restart(&mut unharmed, room), Runs::New);
         let seconds = 0..unharmed.counts.moments - flash.counts.moments;
         let (seconds, stride) = match cuts {
-            // Other second cuts for each first one.
+            // The second cuts differ from one first cut to the next.
             Cuts::Every(strides) => (first % strides.second..seconds.end, strides.second),
             Cuts::One(_, None) => (0..0, 1),
             Cuts::One(_, Some(second)) => {
@@ -226,7 +226,7 @@ fn cut_updates<const W: usize, const E: usize>(cuts: Cuts) -> u64 {
             made += 1;
             let after_second = genomes.after_restart(&mut flash, room);
             if after_first == Runs::New {
-                assert_eq!(after_second, Runs::New, "it had been there already");
+                assert_eq!(after_second, Runs::New, "the new genome was already in use");
             }
             if second % THIRD_STRIDE == first % THIRD_STRIDE {
                 genomes.update(&mut flash, room).expect("power is back");
@@ -237,7 +237,7 @@ fn cut_updates<const W: usize, const E: usize>(cuts: Cuts) -> u64 {
     made
 }
 
-/// A kind of chip: bytes written and erased at a time, and the test of it.
+/// A kind of chip: its write size and erase size in bytes, and the function that tests it.
 type Chip = (usize, usize, fn(Cuts) -> u64);
 
 const CHIPS: [Chip; 12] = [
@@ -255,7 +255,7 @@ const CHIPS: [Chip; 12] = [
     (32, 128 << 10, cut_updates::<32, { 128 << 10 }>),
 ];
 
-/// `write_size:erase_size:first:second`; `-` for no second cut.
+/// Parses `write_size:erase_size:first:second`; `-` stands for no second cut.
 fn replayed_case(text: &str) -> Option<(Chip, Cuts)> {
     let mut parts = text.split(':');
     let write_size: usize = parts.next()?.parse().ok()?;
@@ -281,7 +281,7 @@ fn a_robot_runs_the_old_or_the_new_genome_whenever_its_power_fails() {
     let strides = match (all_cases(), cfg!(debug_assertions)) {
         (true, false) => ALL,
         (true, true) => {
-            println!("all second cuts take a release build: cargo test --release");
+            println!("testing all second cuts requires a release build: cargo test --release");
             REDUCED
         }
         (false, _) => REDUCED,
@@ -432,7 +432,7 @@ fn of_two_genomes_with_equal_write_counts_the_first_slots_is_used() {
     assert_eq!(slots.newest().map(|(slot, _)| slot), Some(Slot::Second));
 }
 
-/// How a chip mishandles one of its writes.
+/// Ways in which a chip mishandles a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Treatment {
     /// Reports success but has written nothing.
@@ -443,7 +443,7 @@ enum Treatment {
 
 struct Unreliable {
     flash: MockFlash<4, 256>,
-    /// Remaining writes before the mishandled one.
+    /// Number of writes before the mishandled one.
     writes_before: usize,
     treatment: Treatment,
 }
@@ -514,14 +514,14 @@ fn the_bytes_in_flash_count_more_than_what_a_chip_reports_of_a_write() {
                     "{outcome:?}"
                 ),
                 Treatment::Misreports if writes_before == writes - 1 => {
-                    assert_eq!(outcome, Ok(2), "the commit record is there");
+                    assert_eq!(outcome, Ok(2), "the commit record is in flash");
                 }
                 Treatment::Misreports => {
                     assert_eq!(outcome, Err(UpdateError::Flash(PowerCut)));
                 }
             }
             let newest = if outcome.is_ok() { new } else { old };
-            assert_eq!(slots.taken(), None, "the update is over");
+            assert_eq!(slots.taken(), None, "no update is in progress");
             let flash = slots.release();
             let mut slots = Slots::open(flash, offset, room).unwrap();
             match slots.in_use(room) {
@@ -553,7 +553,7 @@ fn empty_interrupted_and_unreadable_slots_are_distinguished() {
     assert_eq!(Slot::ALL.map(|slot| slots.state(slot)), expected);
     assert_eq!(states(&mut begun), expected);
 
-    // Another program's words at the places of the header and the commit record.
+    // Words of a different program in place of the header and the commit record.
     for at in [0, COMMIT_AT] {
         let mut strange = blank.clone();
         strange.write(Flash::OFFSET + at, b"ELF!").unwrap();
@@ -722,7 +722,7 @@ fn mapped_flash_is_read_in_place() {
     assert_eq!(slots.write(&genome, &mut InPlace), Ok(1));
     match slots.in_use(&mut InPlace) {
         InUse::Slot { genome: found, .. } => assert_eq!(Ok(found), EncodedGenome::decode(&genome)),
-        InUse::BuiltIn => panic!("it was written"),
+        InUse::BuiltIn => panic!("the genome was written"),
     }
 }
 
