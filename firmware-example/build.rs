@@ -1,4 +1,4 @@
-//! Copies the memory layout to where the linker looks for it, and passes the linker scripts.
+//! Copies the memory layout to the linker's search path, and passes the linker scripts.
 
 use std::{env, fs, path::PathBuf};
 

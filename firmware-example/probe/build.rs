@@ -1,4 +1,4 @@
-//! Copies the memory layout to where the linker looks for it, and passes the linker script.
+//! Copies the memory layout to the linker's search path, and passes the linker script.
 
 use std::{env, fs, path::PathBuf};
 

@@ -1,8 +1,8 @@
-//! The emulated board: how a program ends.
+//! The emulated board: functions that end a program.
 //!
-//! Linking this module also links the logger and the critical section that it needs.
+//! Linking this module also links the logger and the critical section that the logger needs.
 //!
-//! Contains `unsafe` code: the wheels' register is an address.
+//! Uses `unsafe` because the wheels' register is an address.
 #![allow(unsafe_code)]
 
 use crate::faults::{Fault, WheelsOff};
@@ -16,7 +16,7 @@ pub fn succeed() -> ! {
     end(EXIT_SUCCESS)
 }
 
-/// Ends the emulator with failure, after the error has been logged.
+/// Exits the emulator with a failure status; to be called after the error has been logged.
 pub fn fail() -> ! {
     end(EXIT_FAILURE)
 }
@@ -27,7 +27,8 @@ fn end(status: ExitStatus) -> ! {
     }
 }
 
-/// The lights of the board, which stand for the left wheel (bit 0) and the right wheel (bit 1).
+/// Register of the board's lights, which stand for the left wheel (bit 0) and the right wheel (bit
+/// 1).
 pub(crate) const WHEELS: u32 = 0x4002_8000;
 
 // SAFETY: a register that only controls lights.

@@ -1,25 +1,26 @@
 //! Fault handling: in every fault, the wheels stop first.
 //!
 //! A fault may occur while the program holds a lock, or because the stack is full. So the handlers
-//! of [`fault_handlers`](crate::fault_handlers) take no lock and use neither stack nor variables
-//! until they have written a few registers, the board's [`WheelsOff`]. Then they reset the stack
-//! pointer to the top of the stack, which is no longer needed, and report the fault.
+//! of [`fault_handlers`](crate::fault_handlers) take no lock, and use neither stack nor variables
+//! until they have written the board's [`WheelsOff`], a few registers. Then they reset the stack
+//! pointer to the top of the stack, whose contents are no longer needed, and report the fault.
 //!
 //! **Stack guard.** `memory.x` places the stack below all variables, at the start of RAM, and
-//! [`guard_stack`] forbids access below RAM. So a stack overflow is a fault immediately, and no
+//! [`guard_stack`] forbids access below RAM. So a stack overflow causes a fault immediately, and no
 //! variable is overwritten.
 //!
-//! Contains `unsafe` code: registers are addresses, and the handlers are in assembler.
+//! Uses `unsafe` because registers are addresses, and for handlers in assembler.
 #![allow(unsafe_code)]
 
 use core::{fmt, ptr};
 
-/// The processor's register with the number of the current exception.
+/// The processor's register that holds the number of the current exception.
 const INTERRUPT_STATE: *const u32 = 0xe000_ed04 as *const u32;
-/// The bits of that register that hold the number.
+/// The bits of [`INTERRUPT_STATE`] that hold the number.
 const EXCEPTION: u32 = 0x1ff;
-/// The exception of a hard fault, and of the non-maskable interrupt.
+/// Number of the hard fault exception.
 const HARD_FAULT: u32 = 3;
+/// Number of the non-maskable interrupt.
 const NON_MASKABLE: u32 = 2;
 /// Offset from the stack pointer at which an exception stores the address of the interrupted
 /// instruction.
@@ -28,16 +29,16 @@ const PC_AT: u32 = 24;
 /// Registers of the memory protection unit.
 mod mpu {
     pub(super) const CONTROL: *mut u32 = 0xe000_ed94 as *mut u32;
-    /// On; addresses outside all regions have their default access. Off during faults.
+    /// Protection on, off during faults; addresses outside all regions have their default access.
     pub(super) const CONTROL_ON: u32 = 0b101;
     pub(super) const REGION: *mut u32 = 0xe000_ed98 as *mut u32;
     pub(super) const START: *mut u32 = 0xe000_ed9c as *mut u32;
     pub(super) const ATTRIBUTES: *mut u32 = 0xe000_eda0 as *mut u32;
-    /// No access, no execution, 2¹⁵ bytes, on.
+    /// A region of 2¹⁵ bytes, on, with no access and no execution.
     pub(super) const FORBIDDEN_32_KIB: u32 = 1 << 28 | 14 << 1 | 1;
 }
 
-/// The 32 KiB below RAM, larger than any function's frame.
+/// Start of the 32 KiB below RAM, which are larger than any function's frame.
 const BELOW_RAM: u32 = 0x1fff_8000;
 
 /// Forbids access to the addresses below RAM, which begins at 0x20000000. Without this, the effect
@@ -53,18 +54,18 @@ pub fn guard_stack() {
     }
 }
 
-/// Register writes that stop the wheels, whatever the program was doing.
+/// List of register writes that stop the wheels, whatever the program was doing.
 #[derive(Debug)]
 #[repr(C)]
 pub struct WheelsOff<const N: usize> {
-    /// Address and value.
+    /// Addresses and values.
     writes: [[u32; 2]; N],
-    /// Ends the list for the handlers.
+    /// End marker of the list, for the handlers.
     end: u32,
 }
 
 impl<const N: usize> WheelsOff<N> {
-    /// Values to write, each behind the address of its register, in order.
+    /// Creates the list from pairs of a register address and the value to write, in order.
     ///
     /// # Safety
     /// The addresses are registers of the chip, not 0, and the values may be written at any time.
@@ -76,7 +77,7 @@ impl<const N: usize> WheelsOff<N> {
     /// Stops the wheels.
     pub fn write(&self) {
         for [address, value] in self.writes {
-            // SAFETY: as promised to `new`.
+            // SAFETY: guaranteed by the caller of `new`.
             unsafe { ptr::write_volatile(address as *mut u32, value) };
         }
     }
@@ -107,7 +108,8 @@ impl Fault {
         if !stack.contains(&stack_pointer) {
             return Self::StackOverflow;
         }
-        // SAFETY: registers that the exception has saved on the stack, and one of the processor.
+        // SAFETY: reads registers that the exception has saved on the stack, and one of the
+        // processor.
         let (pc, exception) = unsafe {
             let pc = ptr::read_volatile((stack_pointer + PC_AT) as *const u32);
             (pc, ptr::read_volatile(INTERRUPT_STATE) & EXCEPTION)

@@ -1,7 +1,7 @@
-//! Counting instructions under QEMU.
+//! Counter of instructions under QEMU.
 //!
 //! With `-icount`, QEMU's clock advances by a fixed time per instruction, and SysTick counts that
-//! time. A block of `nop`s calibrates how many ticks an instruction takes. These are instructions
+//! time. A block of `nop`s calibrates the number of ticks per instruction. The unit is instructions
 //! executed, not cycles: QEMU does not model a pipeline, and on the chip some instructions take
 //! more than one cycle.
 
@@ -10,22 +10,22 @@ use cortex_m::asm::nop;
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 
-/// SysTick counts down from here.
+/// Value from which SysTick counts down.
 pub const RELOAD: u32 = 0x00ff_ffff;
 
 /// Number of `nop`s for the calibration.
 const NOPS: u32 = 1000;
 
-/// Counts the instructions of a piece of work.
+/// Counter of the instructions of a function.
 pub struct Counter {
-    /// Ticks of reading the clock twice.
+    /// Number of ticks for reading the clock twice.
     empty_ticks: u32,
-    /// Ticks of [`NOPS`] instructions.
+    /// Number of ticks of [`NOPS`] instructions.
     nops_ticks: u32,
 }
 
 impl Counter {
-    /// Starts SysTick and calibrates it. `None` if it does not count instructions, for example
+    /// Starts SysTick and calibrates it. `None` if SysTick does not count instructions, for example
     /// without `-icount`.
     #[must_use]
     pub fn new(mut systick: SYST) -> Option<Self> {
@@ -49,14 +49,14 @@ impl Counter {
             .then_some(counter)
     }
 
-    /// Returns the number of instructions of `work`, and its result. At most about 650,000
-    /// instructions: then SysTick wraps around.
+    /// Returns the number of instructions of `work`, and its result. The maximum is about 650,000
+    /// instructions: above it, SysTick wraps around.
     pub fn count<T>(&self, work: impl FnOnce() -> T) -> (u32, T) {
         let mut result = None;
         let ticks = ticks(|| result = Some(work()));
         match result {
             Some(result) => (self.instructions(ticks), result),
-            None => unreachable!("the work was done"),
+            None => unreachable!("`work` was called"),
         }
     }
 
@@ -86,7 +86,7 @@ macro_rules! ten {
 }
 use ten;
 
-/// Ticks from before `work` until after it.
+/// Returns the number of ticks from before `work` until after it.
 #[inline(always)]
 fn ticks(work: impl FnOnce()) -> u32 {
     let start = SYST::get_current();

@@ -1,20 +1,20 @@
-//! Flash in RAM, as fast as memory-mapped flash.
+//! Flash emulated in RAM, as fast as memory-mapped flash.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 
-/// Room for two slots.
+/// Size of two slots, in bytes.
 const BYTES: usize = 2 * MemoryFlash::ERASE_SIZE;
 
-/// The flash.
+/// Flash in RAM.
 #[derive(Debug)]
 pub struct MemoryFlash {
     bytes: [u8; BYTES],
 }
 
 impl MemoryFlash {
-    /// A flash in its factory state.
+    /// Creates a flash in its factory state.
     #[must_use]
     pub const fn new() -> Self {
         Self {

@@ -1,9 +1,9 @@
 //! The board of QEMU's machine `mps2-an386`: serial line, clock, and flash in a file on the host.
 //!
-//! Its wheels are two lights, and it detects one simulated neighbour; the host drives it with step
-//! requests.
+//! The wheels are two lights, and the sensors detect one simulated neighbour; the host drives the
+//! robot with step requests.
 //!
-//! Contains `unsafe` code: device registers are addresses, and so are the arguments of semihosting.
+//! Uses `unsafe` because device registers and the arguments of semihosting are addresses.
 #![allow(unsafe_code)]
 
 use crate::board::WHEELS;
@@ -22,16 +22,16 @@ use embedded_storage::nor_flash::{
 use minimal_surprise_controller::neighbours::{Detection, Neighbours};
 use minimal_surprise_link::Report;
 
-/// The processor's clock.
+/// Frequency of the processor's clock.
 const CLOCK_HZ: u32 = 25_000_000;
-/// Control periods per second.
+/// Number of control periods per second.
 pub const CONTROL_HZ: u32 = 10;
 
-/// The serial line, the first UART of Arm's CMSDK.
+/// Registers of the serial line, the first UART of Arm's CMSDK.
 mod uart {
     /// The byte received, or the byte to send.
     pub(super) const DATA: *mut u32 = 0x4000_4000 as *mut u32;
-    /// Whether a byte was received, and whether there is room for a byte to send.
+    /// Status bits: a byte was received; the buffer for the byte to send is full.
     pub(super) const STATE: *mut u32 = 0x4000_4004 as *mut u32;
     pub(super) const STATE_SENDING: u32 = 1;
     pub(super) const STATE_RECEIVED: u32 = 1 << 1;
@@ -44,21 +44,21 @@ mod uart {
     pub(super) const DIVIDER: *mut u32 = 0x4000_4010 as *mut u32;
 }
 
-/// Bits per second; QEMU only requires some speed.
+/// Speed of the serial line, in bits per second; QEMU accepts any speed.
 const BAUD: u32 = 115_200;
 
-/// The interrupt of a received byte.
+/// The interrupt that signals a received byte.
 #[derive(Clone, Copy)]
 struct Received;
 
-// SAFETY: the machine's interrupt 0 is that of the first UART's receiver.
+// SAFETY: the machine's interrupt 0 is the interrupt of the first UART's receiver.
 unsafe impl InterruptNumber for Received {
     fn number(self) -> u16 {
         0
     }
 }
 
-/// Serial line and clock.
+/// QEMU's board: serial line and clock.
 ///
 /// No interrupt is ever taken: interrupts only wake the processor, and the loop polls.
 pub struct Mps2 {
@@ -67,7 +67,7 @@ pub struct Mps2 {
 }
 
 impl Mps2 {
-    /// Starts clock and line.
+    /// Starts the clock and the serial line.
     #[must_use]
     pub fn new(mut systick: SYST) -> Self {
         guard_stack();
@@ -77,7 +77,7 @@ impl Mps2 {
         systick.clear_current();
         systick.enable_interrupt();
         systick.enable_counter();
-        // SAFETY: registers of a device that no other code uses. The interrupt is masked.
+        // SAFETY: writes registers of a device that no other code uses. The interrupt is masked.
         unsafe {
             ptr::write_volatile(uart::DIVIDER, CLOCK_HZ / BAUD);
             let control =
@@ -100,7 +100,7 @@ fn uart_state() -> u32 {
 impl Board for Mps2 {
     const CELL_MM: f32 = 100.0;
 
-    /// A neighbour that circles the robot.
+    /// Adds one neighbour that circles the robot.
     fn detect(&mut self, neighbours: &mut Neighbours<NEIGHBOURS_MAX>) -> bool {
         self.periods = self.periods.wrapping_add(1);
         let eighths = (self.periods / CONTROL_HZ % 8) as f32;
@@ -118,7 +118,7 @@ impl Board for Mps2 {
             Motion::Left => 0b10,
             Motion::Right => 0b01,
         };
-        // SAFETY: a register that only controls lights.
+        // SAFETY: writes a register that only controls lights.
         unsafe { ptr::write_volatile(WHEELS as *mut u32, turning) };
     }
 
@@ -158,7 +158,7 @@ impl Board for Mps2 {
         asm::wfi();
     }
 
-    /// The machine's watchdog is not used: a debugger would have to feed it.
+    /// Does nothing: the machine's watchdog is not used, because a debugger would have to feed it.
     fn feed_watchdog(&mut self) {}
 
     fn restarted_by_watchdog(&self) -> bool {
@@ -170,23 +170,24 @@ impl Board for Mps2 {
     }
 }
 
-/// Flash in the file `flash.bin`, in the directory where QEMU was started. Written data survives
-/// when QEMU is killed.
+/// Flash in the file `flash.bin`, in the directory where QEMU was started. Written data survives if
+/// QEMU is killed.
 ///
-/// As strict as real flash: words of 4 bytes, pages of 4 KiB, no word written twice.
+/// The flash is as strict as a real one: 4-byte words, 4-KiB pages, and no word may be written
+/// twice.
 #[derive(Debug)]
 pub struct FileFlash {
     handle: usize,
 }
 
-/// The file cannot be used as flash.
+/// Reason why the file cannot be used as flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub enum FileError {
-    /// Out of bounds or not aligned.
+    /// The access is out of bounds or not aligned.
     Place(#[defmt(Debug2Format)] NorFlashErrorKind),
     /// The host's operating system reports an error.
     Host,
-    /// The word is not erased.
+    /// The word to write is not erased.
     WrittenTwice,
 }
 
@@ -205,17 +206,17 @@ impl From<NorFlashErrorKind> for FileError {
     }
 }
 
-/// Bytes erased by one write to the file; QEMU may be killed between two of these writes.
+/// Number of bytes erased by one write to the file; QEMU may be killed between two of these writes.
 const ERASE_STEP: usize = 512;
 
 impl FileFlash {
-    /// Bytes of the flash: room for two slots.
+    /// Size of the flash in bytes: that of two slots.
     pub const CAPACITY: usize = 2 * Self::ERASE_SIZE;
 
     /// Opens the file, or creates one in the factory state.
     ///
     /// # Errors
-    /// [`FileError::Host`].
+    /// [`FileError::Host`] if the host cannot open or write the file.
     pub fn open() -> Result<Self, FileError> {
         let handle = match host_open(nr::open::RW_BINARY) {
             None => host_open(nr::open::RW_TRUNC_BINARY),
@@ -267,7 +268,7 @@ impl FileFlash {
 
 fn host_open(mode: usize) -> Option<usize> {
     let name = c"flash.bin".to_bytes_with_nul();
-    // SAFETY: the host reads the name, which ends with a zero byte, and its length without that
+    // SAFETY: the host reads the name, which ends with a zero byte, and the length without that
     // byte.
     let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.len() - 1) };
     (handle != usize::MAX).then_some(handle)

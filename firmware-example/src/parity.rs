@@ -1,8 +1,8 @@
 //! Hashes of everything that the controller computes, which must be equal on every machine.
 //!
-//! All 65,536 activations; and for every topology the decisions and hidden values of many control
-//! steps. Genomes and sensor bits come from ChaCha8 with the seed [`SEED`] and the topology's index
-//! in [`Topology::ALL`] as its stream.
+//! The hashes cover all 65,536 activations and, for every topology, the decisions and hidden values
+//! of many control steps. Genomes and sensor bits come from ChaCha8 with the seed [`SEED`] and the
+//! topology's index in [`Topology::ALL`] as its stream.
 
 use core::fmt;
 use minimal_surprise_controller::{
@@ -12,20 +12,20 @@ use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use sha2::{Digest as _, Sha256};
 
-/// Seed of the generator that genomes and sensor bits are drawn from.
+/// Seed of the generator that draws genomes and sensor bits.
 pub const SEED: u64 = 0x5357_4152_4d20_4d34;
 
-/// How often every weight of a genome mutates, one entry per genome. The last genomes have weights
-/// across the whole range of `i16`, many of them saturated.
+/// Number of times that every weight of a genome mutates, one entry per genome. The last genomes
+/// have weights across the whole range of `i16`, many of them saturated.
 pub const MUTATIONS: [u32; 10] = [0, 0, 1, 2, 5, 10, 50, 100, 500, 1000];
 
-/// Control steps of each genome.
+/// Number of control steps of each genome.
 pub const STEPS_PER_GENOME: u32 = 1000;
 
-/// Control steps of each topology.
+/// Number of control steps of each topology.
 pub const STEPS_PER_TOPOLOGY: u32 = MUTATIONS.len() as u32 * STEPS_PER_GENOME;
 
-/// Control steps over all topologies.
+/// Number of control steps over all topologies.
 pub const STEPS: u32 = Topology::ALL.len() as u32 * STEPS_PER_TOPOLOGY;
 
 const _: () = assert!(STEPS >= 100_000);
@@ -43,14 +43,14 @@ impl fmt::Display for Digest {
     }
 }
 
-/// A result; displayed as the line that a program prints.
+/// One result; displayed as the line that a program prints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {
-    /// Hash of all activations. Begins with the kernel's identity.
+    /// Hash of all activations. Begins with the kernel ID.
     Activations(Digest),
     /// Hash of the control steps of one topology.
     Topology(Topology, Digest),
-    /// Hash of the digests before, and so of everything.
+    /// Hash of all preceding digests, and so of all results.
     Total(Digest),
 }
 
@@ -77,7 +77,7 @@ impl fmt::Display for Line {
     }
 }
 
-/// Computes everything, passing on each line as soon as it is known.
+/// Computes all results and passes each line to `line` as soon as it is known.
 pub fn run(mut line: impl FnMut(Line)) {
     let mut total = Sha256::new();
     let digest = activations();
@@ -91,7 +91,7 @@ pub fn run(mut line: impl FnMut(Line)) {
     line(Line::Total(Digest(total.finalize().into())));
 }
 
-/// Hash of every activation as a little-endian `i16`, in the order of the inputs from −32768 to
+/// Hashes every activation as a little-endian `i16`, in the order of the inputs from −32768 to
 /// 32767.
 #[must_use]
 pub fn activations() -> Digest {
@@ -102,8 +102,8 @@ pub fn activations() -> Digest {
     Digest(hash.finalize().into())
 }
 
-/// Hash of [`STEPS_PER_TOPOLOGY`] steps: action, turn, prediction and all hidden values of each,
-/// and each genome's surprise at the end.
+/// Hashes [`STEPS_PER_TOPOLOGY`] steps: action, turn, prediction and all hidden values of each
+/// step, and each genome's surprise at the end.
 #[must_use]
 pub fn control_steps(topology: Topology, stream: u64) -> Digest {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
@@ -129,7 +129,7 @@ pub fn control_steps(topology: Topology, stream: u64) -> Digest {
     Digest(hash.finalize().into())
 }
 
-/// A random genome after the given number of mutations of every weight.
+/// Draws a random genome and mutates every weight the given number of times.
 #[must_use]
 pub fn draw_genome(topology: Topology, mutations: u32, rng: &mut ChaCha8Rng) -> Genome {
     let every_weight = const { MutationRate::ratio(1, 1).unwrap() };
@@ -140,8 +140,8 @@ pub fn draw_genome(topology: Topology, mutations: u32, rng: &mut ChaCha8Rng) -> 
     genome
 }
 
-/// The next reading, similar to those of a robot: half of the time the last one, a quarter of the
-/// time with one sensor changed, a quarter of the time drawn anew.
+/// Draws the next reading, similar to those of a robot: half of the time the last reading, a
+/// quarter of the time with one sensor changed, a quarter of the time a new random reading.
 #[must_use]
 pub fn draw_sensors(last: SensorBits, rng: &mut ChaCha8Rng) -> SensorBits {
     let word = rng.next_u32();

@@ -1,6 +1,6 @@
-//! Provokes faults to check that the wheels stop. For the programs `faults`, under QEMU only.
+//! Triggers faults to check that the wheels stop. For the programs `faults`, under QEMU only.
 //!
-//! Contains `unsafe` code: only unsafe code causes faults.
+//! Uses `unsafe`, because safe code cannot cause faults.
 #![allow(unsafe_code)]
 
 use core::arch::asm;
@@ -17,12 +17,12 @@ const INTERRUPTS_ENABLE: *mut u32 = 0xe000_e100 as *mut u32;
 const INTERRUPTS_PENDING: *mut u32 = 0xe000_e200 as *mut u32;
 /// An interrupt without a handler in these programs.
 const UNEXPECTED: u32 = 1 << 20;
-/// Forbidden: below RAM.
+/// An address below RAM, where access is forbidden.
 const BELOW_RAM: *mut u32 = 0x1fff_fff0 as *mut u32;
-/// Registers of the processor, which cannot be executed.
+/// Address of processor registers, which cannot be executed.
 const NO_PROGRAM: u32 = 0xe000_0001;
 
-/// Provokes the fault named by the second word of the program's command line, with interrupts
+/// Triggers the fault named by the second word of the program's command line, with interrupts
 /// masked, as if it occurred while the wheels are being set.
 ///
 /// # Panics
@@ -54,11 +54,11 @@ pub fn provoke() -> ! {
             }
             Some("deep-recursion") => drop(black_box(recurse::<4>(1))),
             Some("large-frames") => drop(black_box(recurse::<1024>(1))),
-            _ => panic!("no such fault: {line}"),
+            _ => panic!("unknown fault: {line}"),
         }
         asm!("dsb", "isb");
     }
-    panic!("nothing happened")
+    panic!("the fault did not occur")
 }
 
 #[inline(never)]

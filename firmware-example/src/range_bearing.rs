@@ -1,33 +1,33 @@
 //! Neighbours from a range-and-bearing module on a serial line.
 //!
-//! There is no standard protocol for such modules, so this is one that a builder can implement in a
-//! few lines. After each scan the module sends one frame, framed as on the line to the host (`00`,
-//! COBS of message and CRC-32C, `00`; see `docs/link-protocol.md`). The message is
+//! There is no standard protocol for such modules; builders can implement this one in a few lines.
+//! After each scan the module sends one frame, with the same framing as on the host's serial line
+//! (`00`, COBS of message and CRC-32C, `00`; see `docs/link-protocol.md`). The message is
 //!
 //! | bytes | contents |
 //! |---|---|
-//! | 1 | neighbours found, 0 to 36 |
+//! | 1 | number of neighbours found, 0 to 36 |
 //! | 2 each | range in mm between the centres of the two robots, unsigned, little-endian |
 //! | 2 each | bearing in 1/65536 turn, signed, little-endian; counter-clockwise from straight ahead |
 //!
-//! with the range and the bearing of each neighbour next to each other. A scan without neighbours
-//! is sent too: silence means that the module is broken, and the robot stops.
+//! with the range and the bearing of each neighbour next to each other. Scans without neighbours
+//! are sent too: silence means that the module is broken, and the robot stops.
 
 use core::f32::consts::PI;
 use minimal_surprise_controller::neighbours::{Detection, Neighbours};
 use minimal_surprise_link::Decoder;
 
-/// The bearing of half a turn.
+/// Number of bearing units per half turn.
 const HALF_TURN: f32 = 32768.0;
 
-/// Finds scans in the bytes from a module.
+/// Receiver that finds scans in the bytes from a module.
 #[derive(Debug, Default)]
 pub struct RangeBearing {
     decoder: Decoder,
 }
 
 impl RangeBearing {
-    /// A receiver that has received nothing.
+    /// Creates a receiver that has received nothing.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -35,8 +35,8 @@ impl RangeBearing {
         }
     }
 
-    /// Takes a byte. If the byte completes a scan, replaces `neighbours` with those of the scan.
-    /// Returns whether it does.
+    /// Takes a byte. If the byte completes a scan, replaces `neighbours` with the neighbours found
+    /// by the scan and returns true.
     pub fn feed<const N: usize>(&mut self, byte: u8, neighbours: &mut Neighbours<N>) -> bool {
         if !self.decoder.feed(byte) {
             return false;

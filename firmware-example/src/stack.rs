@@ -1,20 +1,20 @@
-//! Measures how much stack a function uses.
+//! Measurement of the stack that a function uses.
 //!
-//! Contains `unsafe` code: it writes to the unused stack, and later checks which words have changed.
+//! Uses `unsafe` because it writes to the unused stack, and later checks which words have changed.
 #![allow(unsafe_code)]
 
 use core::ptr;
 use core::sync::atomic::{Ordering, compiler_fence};
 use cortex_m::register::msp;
 
-/// Bytes that are checked; a larger depth is reported as this one.
+/// Number of bytes that are checked; larger depths are reported as this number.
 pub const DEPTH_MAX: u32 = 8192;
 
 /// The pattern written to the unused stack.
 const PAINT: u32 = 0x7a7a_a5a5;
 
-/// Returns the bytes of stack that `work` and the functions it calls use, up to [`DEPTH_MAX`]. No
-/// interrupt may occur.
+/// Returns the number of stack bytes, up to [`DEPTH_MAX`], that are used by `work` and the
+/// functions it calls. No interrupt may occur.
 ///
 /// The deepest word that was written counts; a frame may extend deeper without using it.
 #[inline(never)]

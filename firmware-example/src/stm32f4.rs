@@ -7,15 +7,15 @@ use minimal_surprise_slots::slot_bytes;
 
 /// First address of the flash.
 pub const FLASH_ADDRESS: u32 = 0x0800_0000;
-/// Bytes of the flash.
+/// Size of the flash, in bytes.
 pub const FLASH_BYTES: u32 = 1 << 20;
-/// Bytes of each sector from 0x08020000 upwards, the chip's erase unit.
+/// Size in bytes of each sector from 0x08020000 upwards, the chip's erase unit.
 pub const SECTOR_BYTES: u32 = 128 << 10;
 /// Address of slot 0.
 pub const SLOT_0_ADDRESS: u32 = 0x080c_0000;
 /// Address of slot 1.
 pub const SLOT_1_ADDRESS: u32 = SLOT_0_ADDRESS + slot_bytes(SECTOR_BYTES as usize) as u32;
-/// Bytes of both slots.
+/// Size of both slots, in bytes.
 pub const SLOTS_BYTES: u32 = 2 * slot_bytes(SECTOR_BYTES as usize) as u32;
 
 const _: () = assert!(SLOT_0_ADDRESS + SLOTS_BYTES == FLASH_ADDRESS + FLASH_BYTES);

@@ -635,7 +635,7 @@ fn clients_take_only_the_reply_to_their_pending_request() {
     );
     let done = wire_of(&reply(0, Reply::Done));
     assert_eq!(take(&mut client, &done), Some("Done".into()));
-    assert_eq!(take(&mut client, &done), None, "the request is not pending any more");
+    assert_eq!(take(&mut client, &done), None, "no request is pending");
 
     let first = client.request(&Request::Stop).unwrap().to_vec();
     assert_eq!(client.timed_out(), Ok(&first[..]));

@@ -1,4 +1,4 @@
-//! The parts of an evaluation, one by one, so that a loss shows where it happened:
+//! Benchmarks of the parts of an evaluation, to locate a loss of speed:
 //! `cargo bench -p minimal-surprise-sim`. `evolver bench` measures complete evaluations.
 
 use divan::Bencher;
@@ -10,7 +10,7 @@ use minimal_surprise_sim::{
 };
 use std::hint::black_box;
 
-/// A genome from the middle of an evolution.
+/// Returns a genome from the middle of an evolution.
 fn genome() -> Genome {
     let bytes = include_bytes!("evolved.genome");
     EncodedGenome::decode(bytes)
@@ -45,7 +45,7 @@ fn plain_worlds_step_of_100_robots(bencher: Bencher) {
         .bench_local(|| world.step(&controller, &mut noise));
 }
 
-/// The fast engine's world alone: sensing, actions by table, moving.
+/// Measures only the world of the fast engine: sensing, actions by table, moving.
 #[divan::bench(args = EnginePath::available().into_iter().map(EnginePath::name))]
 fn fast_world_of_500_steps(bencher: Bencher, path: &str) {
     let trials = trials(0.0, 1);

@@ -11,7 +11,7 @@ use crate::seed::{Purpose, SeedTree, Stream};
 use crate::torus::{Grid, Pose};
 use crate::world::{WorldError, check_poses};
 
-/// A rectangle of cells on a torus, corners included.
+/// A rectangle of cells on a torus, including its corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Area {
     grid: Grid,
@@ -19,21 +19,21 @@ pub struct Area {
     to: (u16, u16),
 }
 
-/// The damage cannot be applied.
+/// Reason why the damage cannot be applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DamageError {
     /// A corner of the area is not on the grid.
     #[error("the area's corner ({x}, {y}) is outside the {grid} grid")]
     CornerOutside {
-        /// The corner's x.
+        /// The x coordinate of the corner.
         x: u32,
-        /// The corner's y.
+        /// The y coordinate of the corner.
         y: u32,
         /// The grid.
         grid: Grid,
     },
-    /// Area and swarm are on different grids.
+    /// The area and the swarm are on different grids.
     #[error("the area is on a {area} grid, the swarm on a {swarm} grid")]
     OtherGrid {
         /// Grid of the area.
@@ -41,12 +41,12 @@ pub enum DamageError {
         /// Grid of the swarm.
         swarm: Grid,
     },
-    /// There are too few free cells outside the area.
-    #[error("{robots} robots to reposition, but {free} free cells outside the area")]
+    /// The number of free cells outside the area is too small.
+    #[error("{robots} robots to reposition, but only {free} free cells outside the area")]
     NoRoom {
-        /// Robots in the area.
+        /// Number of robots in the area.
         robots: u32,
-        /// Free cells outside the area.
+        /// Number of free cells outside the area.
         free: u32,
     },
     /// The poses do not fit the grid.
@@ -58,8 +58,8 @@ pub enum DamageError {
 }
 
 impl Area {
-    /// The cells from x0 to x1 and from y0 to y1, ends included. If x0 > x1 the area extends across
-    /// the eastern edge, if y0 > y1 across the northern edge.
+    /// Creates the area from x0 to x1 and from y0 to y1, including both ends. If x0 > x1, the area
+    /// extends across the eastern edge; if y0 > y1, across the northern edge.
     ///
     /// # Errors
     /// [`DamageError::CornerOutside`] if a corner is not on the grid.
@@ -78,7 +78,7 @@ impl Area {
         })
     }
 
-    /// Returns whether the area contains the cell (x, y).
+    /// Returns true if the area contains the cell (x, y).
     #[must_use]
     pub fn contains(self, x: u16, y: u16) -> bool {
         let within = |at: u16, from: u16, to: u16| {
@@ -91,29 +91,31 @@ impl Area {
         within(x, self.from.0, self.to.0) && within(y, self.from.1, self.to.1)
     }
 
-    /// The grid.
+    /// Returns the area's grid.
     #[must_use]
     pub fn grid(self) -> Grid {
         self.grid
     }
 }
 
-/// What happens to the robots in an area.
+/// Effect of the damage on the robots in an area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Damage {
-    /// They are removed (Alg. 1).
+    /// The robots are removed (Alg. 1).
     Remove(Area),
-    /// They are placed on uniformly drawn free cells outside the area, with new headings (Alg. 2).
+    /// The robots are placed on uniformly drawn free cells outside the area, with new headings
+    /// (Alg. 2).
     Reposition(Area),
 }
 
 impl Damage {
-    /// The swarm after the damage. The robots outside the area keep their order and poses;
-    /// repositioned robots follow them, in index order. Removal draws no random numbers.
+    /// Applies the damage and returns the resulting swarm. The robots outside the area keep their
+    /// order and poses; repositioned robots follow them, in index order. Removal draws no random
+    /// numbers.
     ///
     /// # Errors
-    /// [`DamageError`] if the area is on a different grid, the poses do not fit the grid, or there are
-    /// too few free cells for the robots to reposition.
+    /// [`DamageError`] if the area is on a different grid, the poses do not fit the grid, or the
+    /// free cells are too few for the robots to reposition.
     pub fn apply(
         self,
         grid: Grid,
@@ -144,12 +146,12 @@ impl Damage {
         Ok(left)
     }
 
-    /// The run after the damage: its scenario, with the number of robots left, and its trial. Poses
-    /// come from the seed tree's [`Purpose::Damage`], noise from [`Purpose::DamageNoise`], both of
-    /// the repetition.
+    /// Returns the run after the damage: its scenario, with the number of robots left, and its
+    /// trial. Poses come from the seed tree's [`Purpose::Damage`], noise from
+    /// [`Purpose::DamageNoise`], both for the same repetition.
     ///
     /// # Errors
-    /// Those of [`Damage::apply`], and [`DamageError::Scenario`] if no robot is left.
+    /// [`DamageError`] if [`Damage::apply`] fails or no robot is left.
     pub fn trial(
         self,
         scenario: &Scenario,
@@ -170,7 +172,8 @@ impl Damage {
     }
 }
 
-/// Free cells that are not in the area, row by row from the south, each from the west.
+/// Lists the free cells that are not in the area, row by row from the south, each row from the
+/// west.
 fn free_cells_outside(area: Area, robots_outside: &[Pose]) -> Vec<u32> {
     let grid = area.grid;
     let mut free = vec![true; grid.cells() as usize];
@@ -270,7 +273,8 @@ mod tests {
                 *placed.entry((pose.x, pose.y)).or_insert(0) += 1;
             }
         }
-        // 20 cells, 6 of them in the area and 5 taken: 9 are free, each drawn 400 · 4 / 9 times.
+        // Of the 20 cells, 6 are in the area and 5 are taken; 9 are free, each drawn 400 · 4 / 9
+        // times.
         assert_eq!(placed.len(), 9);
         assert!(
             placed.values().all(|count| (130..230).contains(count)),

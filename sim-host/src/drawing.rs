@@ -1,8 +1,8 @@
-//! Swarms as text: one character per cell, north at the top.
+//! Swarms drawn as text: one character per cell, north at the top.
 
 use crate::torus::{Grid, Heading, Pose};
 
-/// The arrow of a heading.
+/// Returns the arrow that stands for a heading.
 #[must_use]
 pub fn arrow(heading: Heading) -> char {
     match heading {
@@ -13,7 +13,7 @@ pub fn arrow(heading: Heading) -> char {
     }
 }
 
-/// The hollow arrow of a heading, for robots that are not highlighted.
+/// Returns the hollow arrow that stands for a heading, for robots that are not highlighted.
 #[must_use]
 pub fn hollow_arrow(heading: Heading) -> char {
     match heading {
@@ -24,17 +24,17 @@ pub fn hollow_arrow(heading: Heading) -> char {
     }
 }
 
-/// An empty cell.
+/// Character of an empty cell.
 pub const EMPTY: char = '·';
 
-/// Draws a swarm, one line per row, the northernmost first.
+/// Draws a swarm, one line per row, northernmost row first.
 #[must_use]
 pub fn draw(grid: Grid, poses: &[Pose]) -> String {
     draw_members(grid, poses, |_| true)
 }
 
-/// [`draw`] with filled arrows for the robots that are members of something and hollow arrows for
-/// the others.
+/// Draws a swarm like [`draw`], with filled arrows for members of a structure and hollow arrows for
+/// all other robots.
 #[must_use]
 pub fn draw_members(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> String {
     let width = usize::from(grid.width());
@@ -50,24 +50,24 @@ pub fn draw_members(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool)
     rows.join("\n")
 }
 
-/// The drawing does not describe a swarm.
+/// Reason why the drawing does not describe a swarm.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DrawingError {
-    /// Rows of different lengths.
+    /// The rows have different lengths.
     #[error("line {line} has {found} cells, the first row {expected}")]
     UnevenRows {
-        /// The line of the text, from 1.
+        /// Number of the line in the text, from 1.
         line: usize,
-        /// Its cells.
+        /// Number of cells in the line.
         found: usize,
-        /// Cells of the first row.
+        /// Number of cells in the first row.
         expected: usize,
     },
-    /// A character that is neither an arrow nor an empty cell.
+    /// The drawing contains a character that is neither an arrow nor an empty cell.
     #[error("line {line}: {found:?}; cells are ▶ ▲ ◀ ▼, hollow ▷ △ ◁ ▽, or ·")]
     UnknownCharacter {
-        /// The line of the text, from 1.
+        /// Number of the line in the text, from 1.
         line: usize,
         /// The character.
         found: char,
@@ -77,11 +77,11 @@ pub enum DrawingError {
     Grid(#[from] crate::torus::GridError),
 }
 
-/// Reads a drawing back: the grid, and the poses row by row from the south, each from the west.
-/// Filled and hollow arrows both stand for robots; spaces and empty lines are skipped.
+/// Parses a drawing; returns the grid, and the poses row by row from the south, each row from the
+/// west. Both filled and hollow arrows stand for robots; spaces and empty lines are skipped.
 ///
 /// # Errors
-/// [`DrawingError`] says which line is wrong.
+/// [`DrawingError`] if the rows differ in length, a character is unknown or the grid is invalid.
 pub fn parse(drawing: &str) -> Result<(Grid, Vec<Pose>), DrawingError> {
     let mut rows: Vec<(usize, Vec<Option<Heading>>)> = Vec::new();
     for (line, text) in (1..).zip(drawing.lines()) {
@@ -112,7 +112,8 @@ pub fn parse(drawing: &str) -> Result<(Grid, Vec<Pose>), DrawingError> {
     Ok((grid, poses))
 }
 
-/// The heading of the robot that a character stands for, or no robot; `None` if it is not a cell.
+/// Returns the heading of the robot that a character stands for, or `Some(None)` for an empty cell;
+/// `None` if the character is not a cell.
 fn cell(drawn: char) -> Option<Option<Heading>> {
     let of = |heading: &Heading| arrow(*heading) == drawn || hollow_arrow(*heading) == drawn;
     match Heading::ALL.into_iter().find(of) {

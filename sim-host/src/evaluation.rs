@@ -1,7 +1,8 @@
-//! Evaluation: how well a swarm predicts, over one run and over the repetitions of a generation.
+//! Evaluation: the accuracy of a swarm's predictions, in one run and over the repetitions of a
+//! generation.
 //!
 //! Fitness (paper, Eq. 1) is stored as the number of matches: bits that were predicted correctly
-//! one step before. A genome's fitness is the smallest over its repetitions.
+//! one step earlier. A genome's fitness is the smallest over its repetitions.
 
 use crate::metrics::{Measures, Motion};
 use crate::scenario::{Scenario, Trial};
@@ -13,7 +14,7 @@ use minimal_surprise_controller::{Controller, Genome};
 /// A genome's fitness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Evaluation {
-    /// Matches of the worst repetition.
+    /// Number of matches of the worst repetition.
     pub matches: u64,
     /// The worst repetition; the first if tied.
     pub worst_repetition: u32,
@@ -22,25 +23,25 @@ pub struct Evaluation {
 /// The result of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcome {
-    /// Bits predicted correctly.
+    /// Number of bits predicted correctly.
     pub matches: u64,
-    /// Bits sensed.
+    /// Number of bits sensed.
     pub scored_bits: u64,
-    /// How often each sensor was predicted occupied, counting only scored predictions.
+    /// Number of times that each sensor was predicted occupied, counting only scored predictions.
     pub predicted_occupied: Vec<u64>,
     /// Poses at the end.
     pub final_poses: Vec<Pose>,
 }
 
 impl Outcome {
-    /// Fitness F of Eq. 1, 0 to 1.
+    /// Returns the fitness F of Eq. 1, 0 to 1.
     #[must_use]
     pub fn fitness(&self) -> f64 {
         self.matches as f64 / self.scored_bits as f64
     }
 
-    /// Average prediction per sensor (paper, Fig. 9), 0 to 1: mean over robots and steps of the
-    /// predictions that were scored.
+    /// Returns the average prediction per sensor (paper, Fig. 9), 0 to 1: the mean over robots and
+    /// steps of the predictions that were scored.
     #[must_use]
     pub fn average_prediction(&self) -> Vec<f64> {
         let sensors = self.predicted_occupied.len() as f64;
@@ -84,7 +85,7 @@ pub fn run(
     })
 }
 
-/// Returns how the robots of one trial move, and their final poses.
+/// Returns the motion of the robots in one trial, and their final poses.
 ///
 /// # Panics
 /// If the trial's poses do not fit the grid.
@@ -98,7 +99,7 @@ pub fn motion(genome: &Genome, scenario: &Scenario, trial: &Trial) -> (Motion, V
     (measures.motion().clone(), outcome.final_poses)
 }
 
-/// A genome's fitness over all trials.
+/// Returns a genome's fitness over all trials.
 ///
 /// # Panics
 /// If `trials` is empty, or a trial's poses do not fit the grid.
@@ -117,14 +118,14 @@ pub fn evaluate(genome: &Genome, scenario: &Scenario, trials: &[Trial]) -> Evalu
     let (worst_repetition, matches) = (0..)
         .zip(matches)
         .min_by_key(|&(_, matches)| matches)
-        .expect("there is at least one trial");
+        .expect("`trials` is not empty");
     Evaluation {
         matches,
         worst_repetition,
     }
 }
 
-/// Matches and scored bits of the whole swarm so far.
+/// Returns the matches and scored bits of the whole swarm so far.
 #[must_use]
 pub fn matches_of(world: &World) -> (u64, u64) {
     world

@@ -1,10 +1,10 @@
-//! Measures of a run: how well a swarm predicts, how much it moves, and how much of an earlier
-//! structure it keeps.
+//! Measures of a run: the accuracy of a swarm's predictions, its movement, and the share of an
+//! earlier structure that it preserves.
 //!
 //! [`Measures`] observes a run step by step and keeps a few numbers per step and per robot, so that
 //! a million robots need no trace; [`Measures::of_trace`] computes the same numbers for a recorded
-//! run. N is the number of robots present, R the number of sensors, T the number of steps seen.
-//! Everything is counted in integers and divided once, in the functions that return a measure.
+//! run. N is the number of robots present, R the number of sensors, T the number of steps seen. All
+//! counts are integers; the only divisions are in the functions that return a measure.
 
 use crate::torus::{Grid, Pose};
 use crate::trace::Trace;
@@ -13,18 +13,19 @@ use minimal_surprise_controller::sensor::MAX_SENSORS;
 use minimal_surprise_controller::{Action, Decision, SensorBits, SensorModel, Topology};
 use std::collections::BTreeSet;
 
-/// How much the robots of a run moved and intended to move.
+/// Movement and intended movement of the robots of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Motion {
     grid: Grid,
     robots: u32,
-    /// Per step: robots that moved, and robots that chose to go straight.
+    /// Number of robots that moved, per step.
     moved: Vec<u32>,
+    /// Number of robots that chose to go straight, per step.
     straight: Vec<u32>,
 }
 
 impl Motion {
-    /// A run of `robots` robots before its first step.
+    /// Creates the motion of a run of `robots` robots before its first step.
     #[must_use]
     pub fn new(grid: Grid, robots: u32) -> Self {
         Self {
@@ -35,21 +36,22 @@ impl Motion {
         }
     }
 
-    /// Adds a step: the number of robots that moved, and of those that chose to go straight,
-    /// blocked or not.
+    /// Adds a step: the number of robots that moved, and the number that chose to go straight,
+    /// including blocked robots.
     pub fn add_step(&mut self, moved: u32, straight: u32) {
         self.moved.push(moved);
         self.straight.push(straight);
     }
 
-    /// Steps seen, T.
+    /// Returns the number of steps seen, T.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.moved.len() as u32
     }
 
-    /// Temperature T(t) = Mₓ(t) + M_y(t) of each step, with Mₓ(t) = 1/N Σₙ |xₙ(t) − xₙ(t+1)|, in
-    /// cells per step and robot, from 0 to 1. A move across the edge is one cell (paper, Eqs. 2–3).
+    /// Returns the temperature T(t) = Mₓ(t) + M_y(t) of each step, with Mₓ(t) = 1/N Σₙ |xₙ(t) −
+    /// xₙ(t+1)|, in cells per step and robot, from 0 to 1. A move across the edge is one cell
+    /// (paper, Eqs. 2–3).
     #[must_use]
     pub fn temperature(&self) -> Vec<f64> {
         let moved = self.moved.iter();
@@ -58,28 +60,29 @@ impl Motion {
             .collect()
     }
 
-    /// Robot movement M = 1/τ Σ T(t) over the last τ steps, in cells per step and robot, from 0 to
-    /// 1 (paper, Eq. 4). τ is [`Motion::period`].
+    /// Returns the robot movement M = 1/τ Σ T(t) over the last τ steps, in cells per step and
+    /// robot, from 0 to 1 (paper, Eq. 4). τ is [`Motion::period`].
     #[must_use]
     pub fn movement(&self) -> f64 {
         self.mean_over_period(&self.moved)
     }
 
-    /// Intended robot movement I = 1/(N·τ) Σₙ Σₜ aₙ(t) over the last τ steps, aₙ(t) = 1 for a robot
-    /// that chose to go straight, blocked or not, in cells per step and robot, from 0 to 1 (paper,
-    /// Eq. 5; its a is 1 where the networks' action value is 0). I ≥ M. τ is [`Motion::period`].
+    /// Returns the intended robot movement I = 1/(N·τ) Σₙ Σₜ aₙ(t) over the last τ steps, where
+    /// aₙ(t) = 1 for a robot that chose to go straight, blocked or not, in cells per step and
+    /// robot, from 0 to 1 (paper, Eq. 5; its a is 1 where the networks' action value is 0). I ≥ M.
+    /// τ is [`Motion::period`].
     #[must_use]
     pub fn intended_movement(&self) -> f64 {
         self.mean_over_period(&self.straight)
     }
 
-    /// τ = ⌈Lx·Ly / 2⌉ steps, at most the steps seen (paper, Sec. 2.1).
+    /// Returns τ = ⌈Lx·Ly / 2⌉ steps, but not more than the steps seen (paper, Sec. 2.1).
     #[must_use]
     pub fn period(&self) -> u32 {
         self.grid.cells().div_ceil(2).min(self.steps())
     }
 
-    /// Mean over robots and the last τ steps.
+    /// Returns the mean over robots and the last τ steps.
     fn mean_over_period(&self, robots_of_steps: &[u32]) -> f64 {
         let period = self.period();
         let first = robots_of_steps.len() - period as usize;
@@ -112,18 +115,18 @@ pub struct Measures {
     model: SensorModel,
     poses: Vec<Pose>,
     predictions: Vec<SensorBits>,
-    /// Bits mispredicted in the last step, per robot.
+    /// Number of bits mispredicted in the last step, per robot.
     mispredicted_now: Vec<u8>,
     motion: Motion,
-    /// Bits mispredicted, per step.
+    /// Number of bits mispredicted, per step.
     mispredicted: Vec<u64>,
     mispredicted_so_far: u64,
-    /// How often each sensor was predicted occupied.
+    /// Number of times that each sensor was predicted occupied.
     predicted_occupied: [u64; MAX_SENSORS],
 }
 
 impl Measures {
-    /// A run before its first step, with these starting poses.
+    /// Creates the measures of a run before its first step, with these starting poses.
     #[must_use]
     pub fn starting_from(grid: Grid, topology: Topology, starts: &[Pose]) -> Self {
         Self {
@@ -147,7 +150,7 @@ impl Measures {
         self.take_in(world.poses(), world.readings(), world.decisions());
     }
 
-    /// The measures of a recorded run.
+    /// Computes the measures of a recorded run.
     ///
     /// # Panics
     /// If the number of robots changes during the run.
@@ -159,7 +162,7 @@ impl Measures {
         measures
     }
 
-    /// Adds the steps of a trace, calling `observe` after each.
+    /// Adds the steps of a trace, calling `observe` after each step.
     fn replay(&mut self, trace: &Trace, mut observe: impl FnMut(&Self)) {
         let after = trace.steps.iter().skip(1).map(|step| &step.poses);
         let after = after.chain([&trace.final_poses]);
@@ -169,14 +172,14 @@ impl Measures {
         }
     }
 
-    /// Adds one step: the poses after it, and what was sensed and decided in it.
+    /// Adds one step: the poses after it, and its readings and decisions.
     fn take_in(&mut self, poses: &[Pose], readings: &[SensorBits], decisions: &[Decision]) {
         let robots = self.poses.len();
         assert!(
             [poses.len(), readings.len(), decisions.len()] == [robots; 3],
-            "the number of robots does not change during a run"
+            "the number of robots must not change during a run"
         );
-        // A robot moves by at most one cell per step, so the distance is 0 or 1, also across the
+        // A robot moves by at most one cell per step, so the distance is 0 or 1, even across the
         // edge.
         let moved = self.poses.iter().zip(poses);
         let moved = moved.filter(|(from, to)| (from.x, from.y) != (to.x, to.y));
@@ -205,29 +208,29 @@ impl Measures {
         }
     }
 
-    /// Steps seen, T.
+    /// Returns the number of steps seen, T.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.motion.steps()
     }
 
-    /// Poses after the last step seen.
+    /// Returns the poses after the last step seen.
     #[must_use]
     pub fn poses(&self) -> &[Pose] {
         &self.poses
     }
 
-    /// Fitness F = 1/(N·T·R) Σₜ Σₙ Σᵣ (1 − |pₙʳ(t) − sₙʳ(t)|), from 0 (every bit mispredicted) to
-    /// 1 (none); 0 before the first step. pₙʳ(t) is the prediction made at t − 1; at t = 0 it is
-    /// the template, or 0 (paper, Eq. 1).
+    /// Returns the fitness F = 1/(N·T·R) Σₜ Σₙ Σᵣ (1 − |pₙʳ(t) − sₙʳ(t)|), from 0 (every bit
+    /// mispredicted) to 1 (no bit mispredicted); 0 before the first step. pₙʳ(t) is the prediction
+    /// made at t − 1; at t = 0 it is the template, or 0 (paper, Eq. 1).
     #[must_use]
     pub fn fitness(&self) -> f64 {
         let bits = self.bits_per_step() * u64::from(self.steps());
         ratio(bits - self.mispredicted_so_far, bits)
     }
 
-    /// Average prediction of each sensor, 1/(N·T) Σₜ Σₙ pₙʳ(t), from 0 (always empty) to 1 (always
-    /// occupied), over the predictions that count towards fitness (paper, Fig. 9).
+    /// Returns the average prediction of each sensor, 1/(N·T) Σₜ Σₙ pₙʳ(t), from 0 (always empty)
+    /// to 1 (always occupied), over the predictions that count towards fitness (paper, Fig. 9).
     #[must_use]
     pub fn average_prediction(&self) -> Vec<f64> {
         let readings = self.robots() * u64::from(self.steps());
@@ -235,46 +238,46 @@ impl Measures {
         counts.iter().map(|&count| ratio(count, readings)).collect()
     }
 
-    /// Temperature, movement and intended movement.
+    /// Returns the motion: temperature, movement and intended movement.
     #[must_use]
     pub fn motion(&self) -> &Motion {
         &self.motion
     }
 
-    /// [`Motion::temperature`].
+    /// Returns [`Motion::temperature`].
     #[must_use]
     pub fn temperature(&self) -> Vec<f64> {
         self.motion.temperature()
     }
 
-    /// [`Motion::movement`].
+    /// Returns [`Motion::movement`].
     #[must_use]
     pub fn movement(&self) -> f64 {
         self.motion.movement()
     }
 
-    /// [`Motion::intended_movement`].
+    /// Returns [`Motion::intended_movement`].
     #[must_use]
     pub fn intended_movement(&self) -> f64 {
         self.motion.intended_movement()
     }
 
-    /// [`Motion::period`].
+    /// Returns [`Motion::period`].
     #[must_use]
     pub fn period(&self) -> u32 {
         self.motion.period()
     }
 
-    /// Surprise of the swarm in each step, 1/(N·R) Σₙ Σᵣ |pₙʳ(t) − sₙʳ(t)|, from 0 to 1. One minus
-    /// its mean over the steps is the fitness.
+    /// Returns the surprise of the swarm in each step, 1/(N·R) Σₙ Σᵣ |pₙʳ(t) − sₙʳ(t)|, from 0 to
+    /// 1. One minus its mean over the steps is the fitness.
     #[must_use]
     pub fn surprise(&self) -> Vec<f64> {
         let bits = self.bits_per_step();
         self.mispredicted.iter().map(|&n| ratio(n, bits)).collect()
     }
 
-    /// Surprise of each robot in the last step, 1/R Σᵣ |pₙʳ(t) − sₙʳ(t)|, from 0 to 1; 0 before the
-    /// first step.
+    /// Returns the surprise of each robot in the last step, 1/R Σᵣ |pₙʳ(t) − sₙʳ(t)|, from 0 to 1;
+    /// 0 before the first step.
     #[must_use]
     pub fn surprise_of_robots(&self) -> Vec<f64> {
         let bits = self.model.sensors() as u64;
@@ -286,13 +289,14 @@ impl Measures {
         self.poses.len() as u64
     }
 
-    /// N·R.
+    /// Returns N·R.
     fn bits_per_step(&self) -> u64 {
         self.robots() * self.model.sensors() as u64
     }
 }
 
-/// Surprise of each robot over time: for every step of a trace, [`Measures::surprise_of_robots`].
+/// Computes the surprise of each robot over time: [`Measures::surprise_of_robots`] for every step
+/// of a trace.
 ///
 /// # Panics
 /// If the number of robots changes during the run.
@@ -306,19 +310,19 @@ pub fn surprise_over_time(grid: Grid, topology: Topology, trace: &Trace) -> Vec<
     rows
 }
 
-/// What a robot of one state must share with a robot of another to count as a match.
+/// Condition for a robot in one state to match a robot in a different state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Match {
-    /// Cell and heading.
+    /// The same cell and heading.
     Pose,
-    /// The cell only: for triangular lattices, whose robots keep turning.
+    /// The same cell only: for triangular lattices, whose robots keep turning.
     Cell,
 }
 
-/// Similarity S = 1/N Σ m(pᵢ) over the robots of the later state, from 0 to 1: m is 1 if the
-/// earlier state (the final state before the damage) has a robot on the same cell and, with
+/// Computes the similarity S = 1/N Σ m(pᵢ) over the robots of the later state, from 0 to 1: m is 1
+/// if the earlier state (the final state before the damage) has a robot on the same cell and, with
 /// [`Match::Pose`], with the same heading. N is the number of robots of the earlier state, so that
-/// removed robots lower S; 0 if there were none (paper, Eqs. 6–7).
+/// removed robots lower S; 0 if the earlier state has no robots (paper, Eqs. 6–7).
 #[must_use]
 pub fn similarity(after: &[Pose], before: &[Pose], matching: Match) -> f64 {
     let key = |pose: &Pose| {
@@ -333,7 +337,7 @@ pub fn similarity(after: &[Pose], before: &[Pose], matching: Match) -> f64 {
     ratio(matches.count() as u64, before.len() as u64)
 }
 
-/// A quotient; 0 if the divisor is 0.
+/// Returns a quotient; 0 if the divisor is 0.
 fn ratio(part: u64, whole: u64) -> f64 {
     part as f64 / whole.max(1) as f64
 }
@@ -352,7 +356,7 @@ mod tests {
         Topology::new(SensorModel::A, prediction).unwrap()
     }
 
-    /// Runs a drawn world with given decisions: one row per step, one decision per robot.
+    /// Runs a drawn world with the given decisions: one row per step, one decision per robot.
     fn driven(drawing: &str, topology: Topology, steps: &[Vec<Decision>]) -> (Measures, Trace) {
         let (grid, starts) = parse(drawing).unwrap();
         let controller = Controller::new(&Genome::zeroed(topology));
@@ -378,8 +382,9 @@ mod tests {
         }
     }
 
-    /// Two robots that face each other and go straight: each senses one robot, right ahead (bit 0
-    /// of the eight of model A), in both steps. The first expects it at t = 1, the second does not.
+    /// Runs two robots that face each other and go straight. Each senses one robot, directly ahead
+    /// (bit 0 of the eight bits of model A), in both steps. Only the first robot predicts it at t =
+    /// 1.
     fn facing_pair(prediction: Prediction) -> (Measures, Trace) {
         let step = vec![
             decision(Action::Straight, 0b1),
@@ -391,19 +396,19 @@ mod tests {
 
     #[test]
     fn fitness_is_the_share_of_correctly_predicted_bits() {
-        // t = 0: nothing is expected, each robot has 7 of 8 bits right; t = 1: 8 and 7.
+        // At t = 0 nothing is predicted, so each robot has 7 of 8 bits right; at t = 1: 8 and 7.
         // F = (7 + 7 + 8 + 7) / (2 robots · 2 steps · 8 sensors) = 29/32.
         let (measures, _) = facing_pair(Prediction::Free);
         assert_eq!(measures.fitness(), 29.0 / 32.0);
-        // With the pair predefined, bit 0 is expected at t = 0: (8 + 8 + 8 + 7) / 32.
+        // With the pair predefined, bit 0 is predicted at t = 0: (8 + 8 + 8 + 7) / 32.
         let (measures, _) = facing_pair(Prediction::Predefined(Template::Pair));
         assert_eq!(measures.fitness(), 31.0 / 32.0);
     }
 
     #[test]
     fn average_prediction_covers_the_scored_predictions() {
-        // Bit 0 is expected by none of two robots at t = 0 and by one at t = 1: 1 of 4. What they
-        // predict in the last step is never compared.
+        // Bit 0 is predicted by neither robot at t = 0 and by one at t = 1: 1 of 4. The predictions
+        // made in the last step are never compared.
         let (measures, _) = facing_pair(Prediction::Free);
         let expected = [0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         assert_eq!(measures.average_prediction(), expected);
@@ -413,7 +418,7 @@ mod tests {
 
     #[test]
     fn surprise_is_the_share_of_mispredicted_bits() {
-        // t = 0: one of 8 bits for each robot; t = 1: none for the first, one for the second.
+        // At t = 0: one of 8 bits for each robot; at t = 1: none for the first, one for the second.
         let (measures, trace) = facing_pair(Prediction::Free);
         let over_time = surprise_over_time(
             parse("·····\n".repeat(5).as_str()).unwrap().0,
@@ -428,9 +433,9 @@ mod tests {
         assert_eq!(1.0 - mean, measures.fitness());
     }
 
-    /// On 3 × 3 cells for 7 steps: robot 0 runs around the southern row, across the edge; robot 1
-    /// turns three times (north, west, south, east), then runs around the middle row; robots 2 and
-    /// 3 in the northern row block each other.
+    /// Runs four robots on 3 × 3 cells for 7 steps: robot 0 moves around the southern row, across
+    /// the edge; robot 1 turns three times (north, west, south, east), then moves around the middle
+    /// row; robots 2 and 3 in the northern row block each other.
     fn busy() -> Measures {
         let steps: Vec<Vec<Decision>> = (0..7)
             .map(|t| {
@@ -449,7 +454,7 @@ mod tests {
 
     #[test]
     fn temperature_is_the_share_of_robots_that_moved() {
-        // Robot 0 of four moves at t = 0 to 2, robots 0 and 1 from t = 3 on.
+        // Of the four robots, robot 0 moves at t = 0 to 2, and robots 0 and 1 from t = 3.
         let expected = [0.25, 0.25, 0.25, 0.5, 0.5, 0.5, 0.5];
         assert_eq!(busy().temperature(), expected);
     }
@@ -501,13 +506,13 @@ mod tests {
     #[test]
     fn similarity_is_the_share_of_the_original_robots_that_are_found_again() {
         let before = parse("▶▶◀·\n····\n▲··▼").unwrap().1;
-        // Of five robots, the southern two and one of the line are as before, one has turned, and
+        // Of five robots, two in the south and one of the line are unchanged, one has turned, and
         // one is gone: 3/5 with headings, 4/5 without.
         let after = parse("▶▲··\n····\n▲··▼").unwrap().1;
         assert_eq!(similarity(&after, &before, Match::Pose), 0.6);
         assert_eq!(similarity(&after, &before, Match::Cell), 0.8);
         assert_eq!(similarity(&before, &before, Match::Pose), 1.0);
-        // It does not matter which robot it is.
+        // The order of the robots does not matter.
         let renumbered: Vec<Pose> = before.iter().rev().copied().collect();
         assert_eq!(similarity(&renumbered, &before, Match::Pose), 1.0);
         assert_eq!(similarity(&[], &before, Match::Cell), 0.0);

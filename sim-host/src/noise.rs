@@ -2,11 +2,11 @@
 //! (paper, Sec. 3.5).
 //!
 //! The noise is counter-based: the flips of a robot in a step are a function of run seed,
-//! generation, repetition, step and robot. The ChaCha8 key names the first three (see
-//! [`seed`](crate::seed)), the ChaCha stream number is the step, and robot n's words start at word
-//! 8·n: sixteen draws of 16 bits, of which sensor k takes number k (low half of a word first) and
-//! flips if it is below the rate; draws without a sensor flip nothing. So the noise does not depend
-//! on engine, order or thread, and all genomes of a generation get the same noise.
+//! generation, repetition, step and robot. The ChaCha8 key encodes the first three (see
+//! [`seed`](crate::seed)), the ChaCha stream number is the step, and the words of robot n start at
+//! word 8·n. They are sixteen 16-bit draws; sensor k uses draw k (low half of a word first) and
+//! flips if the draw is below the rate. Draws without a sensor flip nothing. So the noise does not
+//! depend on engine, order or thread, and all genomes of a generation get the same noise.
 
 use crate::seed::Stream;
 use minimal_surprise_controller::SensorBits;
@@ -16,7 +16,7 @@ use rand_core::Rng as _;
 /// Number of 32-bit words per robot and step.
 const WORDS_PER_ROBOT: u128 = 8;
 
-/// Every sensor has a draw of its own, of 16 bits.
+/// Every sensor has its own 16-bit draw.
 const _: () = assert!(MAX_SENSORS as u128 <= 2 * WORDS_PER_ROBOT);
 
 /// Probability that a bit is flipped, in units of 1/65,536.
@@ -26,10 +26,11 @@ pub struct NoiseRate {
 }
 
 impl NoiseRate {
-    /// No noise.
+    /// The rate at which no bit is flipped.
     pub const NONE: Self = Self { per_65_536: 0 };
 
-    /// The nearest multiple of 1/65,536; `None` unless the probability is within 0 and 1.
+    /// Rounds a probability to the nearest multiple of 1/65,536; `None` unless the probability is
+    /// within 0 and 1.
     #[must_use]
     pub fn new(probability: f64) -> Option<Self> {
         (0.0..=1.0).contains(&probability).then(|| Self {
@@ -37,13 +38,13 @@ impl NoiseRate {
         })
     }
 
-    /// The probability in units of 1/65,536.
+    /// Returns the probability in units of 1/65,536.
     #[must_use]
     pub fn per_65_536(self) -> u32 {
         self.per_65_536
     }
 
-    /// Returns whether nothing is ever flipped.
+    /// Returns true if no bit is ever flipped.
     #[must_use]
     pub fn is_none(self) -> bool {
         self.per_65_536 == 0
@@ -58,26 +59,26 @@ pub struct NoiseStream {
 }
 
 impl NoiseStream {
-    /// Noise of the given rate from a stream of the seed tree.
+    /// Creates noise of the given rate from a stream of the seed tree.
     #[must_use]
     pub fn new(stream: Stream, rate: NoiseRate) -> Self {
         Self { stream, rate }
     }
 
-    /// The rate.
+    /// Returns the rate.
     #[must_use]
     pub fn rate(&self) -> NoiseRate {
         self.rate
     }
 
-    /// The ChaCha8 key of the stream, from which another program can draw the same noise.
+    /// Returns the ChaCha8 key of the stream, so that a different program can draw the same noise.
     #[must_use]
     pub fn key(&self) -> [u8; 32] {
         self.stream.get_seed()
     }
 
-    /// Flips bits in the readings of all robots in one step, robot 0 first, but only the bits of
-    /// `sensors`.
+    /// Flips bits in the readings of all robots in one step, starting with robot 0. Only the bits
+    /// of `sensors` are flipped.
     pub fn flip(&mut self, step: u32, sensors: SensorBits, readings: &mut [SensorBits]) {
         if self.rate.is_none() {
             return;
@@ -89,8 +90,8 @@ impl NoiseStream {
         }
     }
 
-    /// The sixteen draws of one robot in one step: a bit is set if the draw is below the rate,
-    /// whether or not there is a sensor for it.
+    /// Returns the sixteen draws of one robot in one step: a bit is set if the draw is below the
+    /// rate, even if no sensor uses the draw.
     #[must_use]
     pub fn draws(&mut self, step: u32, robot: u32) -> u16 {
         self.stream.set_stream(step.into());

@@ -30,28 +30,28 @@ pub struct Scenario {
     noise: NoiseRate,
 }
 
-/// The scenario is not valid.
+/// Reason why the scenario is not valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScenarioError {
-    /// There is no robot, or there are more robots than cells.
+    /// The number of robots is 0 or exceeds the number of cells.
     #[error("{robots} robots on a {grid} grid; from 1 to {} fit", grid.cells())]
     RobotsDoNotFit {
-        /// Robots asked for.
+        /// Number of robots requested.
         robots: u32,
         /// The grid.
         grid: Grid,
     },
-    /// There is no step.
+    /// The number of steps is 0.
     #[error("0 steps; at least 1 is needed")]
     NoSteps,
 }
 
 impl Scenario {
-    /// A swarm of `robots` on `grid` for `steps`.
+    /// Creates the scenario of a swarm of `robots` on `grid` for `steps`.
     ///
     /// # Errors
-    /// [`ScenarioError`] if there is no robot, no step, or fewer cells than robots.
+    /// [`ScenarioError`] if `robots` or `steps` is 0, or the grid has fewer cells than robots.
     pub fn new(
         grid: Grid,
         robots: u32,
@@ -72,37 +72,37 @@ impl Scenario {
         }
     }
 
-    /// The grid.
+    /// Returns the grid.
     #[must_use]
     pub fn grid(&self) -> Grid {
         self.grid
     }
 
-    /// Swarm size N.
+    /// Returns the swarm size N.
     #[must_use]
     pub fn robots(&self) -> u32 {
         self.robots
     }
 
-    /// Evaluation length T, in steps.
+    /// Returns the evaluation length T, in steps.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.steps
     }
 
-    /// Sensor noise.
+    /// Returns the rate of the sensor noise.
     #[must_use]
     pub fn noise(&self) -> NoiseRate {
         self.noise
     }
 
-    /// Bits that the swarm senses in one repetition, N·T·R.
+    /// Returns the number of bits that the swarm senses in one repetition, N·T·R.
     #[must_use]
     pub fn scored_bits(&self, sensors: usize) -> u64 {
         u64::from(self.robots) * u64::from(self.steps) * sensors as u64
     }
 
-    /// A repetition of a generation: its starting poses and noise, shared by all genomes.
+    /// Draws a repetition of a generation: its starting poses and noise, shared by all genomes.
     #[must_use]
     pub fn trial(&self, seeds: SeedTree, generation: u32, repetition: u32) -> Trial {
         let stream = |purpose| seeds.stream(purpose, generation, repetition);
@@ -112,8 +112,8 @@ impl Scenario {
         }
     }
 
-    /// A start of a re-evaluation: new starting poses and noise that no generation has used, the
-    /// same for every genome.
+    /// Draws a start of a re-evaluation: new starting poses and noise that no generation has used,
+    /// the same for every genome.
     #[must_use]
     pub fn reevaluation(&self, seeds: SeedTree, start: u32) -> Trial {
         let stream = |purpose| seeds.stream(purpose, 0, start);
@@ -125,7 +125,7 @@ impl Scenario {
     }
 }
 
-/// What differs between the repetitions of an evaluation.
+/// Starting poses and noise of one repetition of an evaluation.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// Starting poses, in index order.
@@ -134,22 +134,22 @@ pub struct Trial {
     pub noise: NoiseStream,
 }
 
-/// Poses on uniformly drawn free cells, with uniform headings.
+/// Draws poses on uniformly drawn free cells, with uniform headings.
 ///
-/// Each robot in turn draws one of the cells still free, as an index into a list, then its heading.
-/// The last cell of the list replaces a drawn cell.
+/// Each robot in turn draws one of the cells that are still free, as an index into a list, and then
+/// its heading. The last cell of the list replaces a drawn cell.
 ///
 /// # Panics
-/// If there are more robots than cells.
+/// If `robots` exceeds the number of cells.
 #[must_use]
 pub fn random_poses(grid: Grid, robots: u32, rng: &mut Stream) -> Vec<Pose> {
     random_poses_among((0..grid.cells()).collect(), grid, robots, rng)
 }
 
-/// [`random_poses`] on the given cells (numbered as [`Grid::cell`]) only.
+/// Draws poses like [`random_poses`], only on the given cells (numbered as in [`Grid::cell`]).
 ///
 /// # Panics
-/// If there are more robots than cells.
+/// If `robots` exceeds the number of cells.
 #[must_use]
 pub fn random_poses_among(
     mut free: Vec<u32>,

@@ -1,4 +1,4 @@
-//! The seed tree: every random stream of a run, named by its purpose.
+//! The seed tree: every random stream of a run, identified by its purpose.
 //!
 //! A stream is a ChaCha8 generator whose 256-bit key is the four numbers run seed, purpose,
 //! generation and index, 64 bits each, little-endian. Streams do not depend on each other, on the
@@ -7,10 +7,10 @@
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
 
-/// The generator of every stream. Results depend on it.
+/// The generator of every stream. A different generator would change all results.
 pub type Stream = ChaCha8Rng;
 
-/// The purpose of a stream. The numbers are part of every result and never change.
+/// The purpose of a stream. Results depend on the numbers, which never change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u64)]
 pub enum Purpose {
@@ -32,8 +32,8 @@ pub enum Purpose {
     Damage = 8,
     /// Sensor noise after damage; generation: 0, index: repetition of the damage experiment.
     DamageNoise = 9,
-    /// Crossover of a genome: whether it happens, the second parent and the weights; index: slot of
-    /// the genome.
+    /// Crossover of a genome: the decision to cross, the second parent and the weights; index: slot
+    /// of the genome.
     Crossover = 10,
 }
 
@@ -44,19 +44,19 @@ pub struct SeedTree {
 }
 
 impl SeedTree {
-    /// The tree of a run's seed.
+    /// Creates the tree of a run's seed.
     #[must_use]
     pub const fn new(seed: u64) -> Self {
         Self { seed }
     }
 
-    /// The run's seed.
+    /// Returns the run's seed.
     #[must_use]
     pub const fn seed(self) -> u64 {
         self.seed
     }
 
-    /// The stream for one purpose.
+    /// Returns the stream for one purpose.
     #[must_use]
     pub fn stream(self, purpose: Purpose, generation: u32, index: u32) -> Stream {
         let mut key = [0; 32];
@@ -68,7 +68,7 @@ impl SeedTree {
     }
 }
 
-/// Uniform in `0..values`, without bias (Lemire's method on 64-bit words).
+/// Draws a value uniform in `0..values`, without bias (Lemire's method on 64-bit words).
 ///
 /// # Panics
 /// If `values` is 0.

@@ -5,9 +5,9 @@ use minimal_surprise_controller::Turn;
 use minimal_surprise_controller::sensor::Cell;
 use serde::{Deserialize, Serialize};
 
-/// Shortest side: on a shorter one a robot would sense itself.
+/// Minimum length of a side: on a shorter side, a robot would sense itself.
 pub const SIDE_MIN: u32 = 3;
-/// Longest side.
+/// Maximum length of a side.
 pub const SIDE_MAX: u32 = 16_384;
 
 /// A torus of `width` × `height` cells.
@@ -21,14 +21,14 @@ pub struct Grid {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a grid of {width}x{height}; each side must be from {SIDE_MIN} to {SIDE_MAX} cells")]
 pub struct GridError {
-    /// Width asked for.
+    /// Width requested.
     pub width: u32,
-    /// Height asked for.
+    /// Height requested.
     pub height: u32,
 }
 
 impl Grid {
-    /// A torus of `width` × `height` cells.
+    /// Creates a torus of `width` × `height` cells.
     ///
     /// # Errors
     /// [`GridError`] if a side is not within [`SIDE_MIN`] and [`SIDE_MAX`].
@@ -44,31 +44,32 @@ impl Grid {
         }
     }
 
-    /// Cells from west to east.
+    /// Returns the number of cells from west to east.
     #[must_use]
     pub fn width(self) -> u16 {
         self.width
     }
 
-    /// Cells from south to north.
+    /// Returns the number of cells from south to north.
     #[must_use]
     pub fn height(self) -> u16 {
         self.height
     }
 
-    /// Number of cells.
+    /// Returns the number of cells.
     #[must_use]
     pub fn cells(self) -> u32 {
         u32::from(self.width) * u32::from(self.height)
     }
 
-    /// Number of a cell: row by row from the south, each from the west.
+    /// Returns the number of a cell: row by row from the south, each row from the west.
     #[must_use]
     pub fn cell(self, x: u16, y: u16) -> u32 {
         u32::from(y) * u32::from(self.width) + u32::from(x)
     }
 
-    /// The cell (dx, dy) from the cell (x, y), across the edges and at any distance.
+    /// Returns the cell at offset (dx, dy) from the cell (x, y), across the edges and at any
+    /// distance.
     #[must_use]
     pub fn moved(self, x: u16, y: u16, dx: i32, dy: i32) -> (u16, u16) {
         let along = |from: u16, by: i32, side: u16| {
@@ -99,7 +100,7 @@ pub enum Heading {
     South = 3,
 }
 
-/// No heading has this number.
+/// Error for a number that is not a heading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("heading {0}; headings are 0 (east), 1 (north), 2 (west) and 3 (south)")]
 pub struct UnknownHeading(pub u8);
@@ -126,13 +127,13 @@ impl Heading {
     /// Every heading, in order.
     pub const ALL: [Self; 4] = [Self::East, Self::North, Self::West, Self::South];
 
-    /// The heading numbered by the two lowest bits.
+    /// Returns the heading with the number in the two lowest bits.
     #[must_use]
     pub fn from_low_bits(bits: u32) -> Self {
         Self::ALL[(bits & 3) as usize]
     }
 
-    /// The heading after a quarter turn.
+    /// Returns the heading after a quarter turn.
     #[must_use]
     pub fn turned(self, turn: Turn) -> Self {
         Self::from_low_bits(match turn {
@@ -141,7 +142,7 @@ impl Heading {
         })
     }
 
-    /// The step (dx, dy) ahead.
+    /// Returns the step (dx, dy) ahead.
     #[must_use]
     pub fn ahead(self) -> (i32, i32) {
         match self {
@@ -152,7 +153,7 @@ impl Heading {
         }
     }
 
-    /// The offset (dx, dy) of a sensed cell from a robot with this heading.
+    /// Returns the offset (dx, dy) of a sensed cell from a robot with this heading.
     #[must_use]
     pub fn offset(self, cell: Cell) -> (i32, i32) {
         let (ahead_x, ahead_y) = self.ahead();
@@ -165,20 +166,21 @@ impl Heading {
     }
 }
 
-/// Where a robot is and which way it faces.
+/// Position and heading of a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(into = "(u16, u16, Heading)", from = "(u16, u16, Heading)")]
 pub struct Pose {
-    /// Cells from the west edge.
+    /// Number of cells from the west edge.
     pub x: u16,
-    /// Cells from the south edge.
+    /// Number of cells from the south edge.
     pub y: u16,
-    /// Direction.
+    /// Direction that the robot faces.
     pub heading: Heading,
 }
 
 impl Pose {
-    /// The bytes of a pose in every hash: x and y in 16 bits, little-endian, and the heading in 8.
+    /// Returns the bytes of a pose in every hash: x and y in 16 bits, little-endian, and the
+    /// heading in 8 bits.
     #[must_use]
     pub fn bytes(self) -> [u8; 5] {
         let ([x0, x1], [y0, y1]) = (self.x.to_le_bytes(), self.y.to_le_bytes());

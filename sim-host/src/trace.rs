@@ -1,17 +1,17 @@
-//! Traces: everything that happened in a run, step by step.
+//! Traces: all states, readings and decisions of a run, step by step.
 
 use crate::torus::Pose;
 use crate::world::World;
 use minimal_surprise_controller::{Decision, SensorBits};
 
-/// One step: the state before it, and what the robots sensed and decided in it.
+/// One step: the state before it, and the robots' readings and decisions in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TraceStep {
     /// Poses before the step.
     pub poses: Vec<Pose>,
-    /// What the robots sensed, noise included.
+    /// The robots' sensor readings, including noise.
     pub readings: Vec<SensorBits>,
-    /// What they decided and now predict.
+    /// The robots' decisions, including their new predictions.
     pub decisions: Vec<Decision>,
 }
 
@@ -25,7 +25,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// An empty trace that starts from the current state of the world.
+    /// Creates an empty trace that starts from the current state of the world.
     #[must_use]
     pub fn starting_from(world: &World) -> Self {
         Self {

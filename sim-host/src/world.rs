@@ -1,9 +1,9 @@
 //! The world: a swarm on a torus, one step at a time.
 //!
-//! In a step, every robot senses the occupancy at time t; then, in index order, each decides and
-//! acts. A robot going straight moves if the cell ahead was empty at time t and no robot of a lower
-//! index has taken it; a cell vacated in this step is still blocked. Noise changes what a robot
-//! senses, never whether it may move.
+//! In a step, every robot senses the occupancy at time t; then each robot, in index order, decides
+//! and acts. A robot going straight moves if the cell ahead was empty at time t and no robot with a
+//! lower index has taken it; a cell vacated in this step is still blocked. Noise affects only the
+//! readings of a robot, not its freedom to move.
 
 use crate::noise::NoiseStream;
 use crate::torus::{Grid, Heading, Pose};
@@ -11,10 +11,10 @@ use minimal_surprise_controller::sensor::MAX_SENSORS;
 use minimal_surprise_controller::{Action, Controller, Decision, SensorBits, SensorModel, State};
 use std::collections::HashMap;
 
-/// How far a robot senses, in cells: the width of the border around the board.
+/// Maximum distance of a sensed cell, in cells: the width of the border around the board.
 const REACH: usize = 2;
 
-/// The poses do not fit the grid.
+/// Reason why the poses do not fit the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WorldError {
@@ -23,23 +23,23 @@ pub enum WorldError {
     OutsideGrid {
         /// Index of the robot.
         robot: usize,
-        /// Its x.
+        /// The x coordinate of the robot.
         x: u16,
-        /// Its y.
+        /// The y coordinate of the robot.
         y: u16,
         /// The grid.
         grid: Grid,
     },
     /// Two robots share a cell.
-    #[error("robot {robot} is at ({x}, {y}), where robot {other} is already")]
+    #[error("robot {robot} is at ({x}, {y}), which robot {other} already occupies")]
     Overlap {
         /// Index of the robot.
         robot: usize,
-        /// Index of the robot that was there first.
+        /// Index of the robot that occupies the cell already.
         other: usize,
-        /// Their x.
+        /// The x coordinate of both robots.
         x: u16,
-        /// Their y.
+        /// The y coordinate of both robots.
         y: u16,
     },
 }
@@ -47,10 +47,10 @@ pub enum WorldError {
 /// Checks that every robot is on the grid and no two share a cell.
 ///
 /// # Errors
-/// [`WorldError`] names the first robot that is wrong.
+/// [`WorldError`] for the first robot that is outside the grid or on an occupied cell.
 pub fn check_poses(grid: Grid, poses: &[Pose]) -> Result<(), WorldError> {
-    // Memory and time depend on the number of robots only: a file with few robots may name any
-    // grid.
+    // Memory and time depend only on the number of robots: a file with few robots may contain any
+    // grid size.
     let mut cells = Vec::with_capacity(poses.len());
     for (robot, &Pose { x, y, .. }) in poses.iter().enumerate() {
         if x >= grid.width() || y >= grid.height() {
@@ -62,7 +62,7 @@ pub fn check_poses(grid: Grid, poses: &[Pose]) -> Result<(), WorldError> {
     check_overlap(grid, poses, &mut cells)
 }
 
-/// Checks that no two robots share a cell; `cells` are the robots' cells and get sorted.
+/// Checks that no two robots share a cell; sorts `cells`, the cells of the robots.
 fn check_overlap(grid: Grid, poses: &[Pose], cells: &mut [u32]) -> Result<(), WorldError> {
     cells.sort_unstable();
     if cells.is_sorted_by(|a, b| a < b) {
@@ -110,7 +110,7 @@ pub struct World {
 }
 
 impl World {
-    /// A swarm before its first step.
+    /// Creates a swarm before its first step.
     ///
     /// # Errors
     /// [`WorldError`] if a robot is outside the grid or two share a cell.
@@ -145,11 +145,11 @@ impl World {
         self.act();
     }
 
-    /// [`World::step`] with decisions from another source: a recording, or a robot on a serial
-    /// line. The robots' network states do not change.
+    /// Runs one step like [`World::step`], with decisions from a different source: a recording, or
+    /// a robot on a serial line. The robots' network states do not change.
     ///
     /// # Panics
-    /// If there is not exactly one decision per robot.
+    /// If the number of decisions differs from the number of robots.
     pub fn step_with(
         &mut self,
         noise: &mut NoiseStream,
@@ -175,7 +175,7 @@ impl World {
         noise.flip(self.step, self.model.mask(), &mut self.readings);
     }
 
-    /// Cells are taken immediately and vacated at the end of the step.
+    /// Moves and turns all robots. Cells are taken immediately and vacated at the end of the step.
     fn act(&mut self) {
         for (pose, decision) in self.poses.iter_mut().zip(&self.decisions) {
             match decision.action {
@@ -197,38 +197,38 @@ impl World {
         self.step += 1;
     }
 
-    /// The grid.
+    /// Returns the grid.
     #[must_use]
     pub fn grid(&self) -> Grid {
         self.grid
     }
 
-    /// Poses now, in index order.
+    /// Returns the current poses, in index order.
     #[must_use]
     pub fn poses(&self) -> &[Pose] {
         &self.poses
     }
 
-    /// Network states now, in index order.
+    /// Returns the current network states, in index order.
     #[must_use]
     pub fn states(&self) -> &[State] {
         &self.states
     }
 
-    /// The sensor readings of the last step, including noise; bits beyond the model's sensors are
-    /// zero.
+    /// Returns the sensor readings of the last step, including noise; bits beyond the model's
+    /// sensors are zero.
     #[must_use]
     pub fn readings(&self) -> &[SensorBits] {
         &self.readings
     }
 
-    /// Returns what the robots decided in the last step; empty before the first.
+    /// Returns the robots' decisions in the last step; empty before the first step.
     #[must_use]
     pub fn decisions(&self) -> &[Decision] {
         &self.decisions
     }
 
-    /// Steps done.
+    /// Returns the number of steps completed.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.step
@@ -292,7 +292,8 @@ impl Board {
     }
 }
 
-/// Indices of a coordinate on the board along one axis: its own and up to two in the border.
+/// Returns the indices of a coordinate on the board along one axis: its own index and up to two in
+/// the border.
 fn places(at: u16, side: u16) -> impl Iterator<Item = usize> {
     let (at, side) = (usize::from(at), usize::from(side));
     let own = at + REACH;

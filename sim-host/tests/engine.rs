@@ -1,4 +1,5 @@
-//! The fast engine returns the results of the plain one, on every path that this processor can run.
+//! Tests that the fast engine returns the results of the plain engine, on every path that this
+//! processor can run.
 
 use minimal_surprise_controller::{Controller, Genome, MutationRate, Topology};
 use minimal_surprise_sim::seed::Stream;
@@ -8,7 +9,7 @@ use minimal_surprise_sim::{
 };
 use rand_core::Rng as _;
 
-/// A genome to test: random, mutated, with large weights or with very small weights.
+/// Draws a genome to test: random, mutated, with large weights or with very small weights.
 fn genome(topology: Topology, rng: &mut Stream) -> Genome {
     let mut genome = Genome::random(topology, rng);
     let shift = match rng.next_u32() % 4 {
@@ -66,7 +67,7 @@ impl Case {
             );
             for skips in [true, false] {
                 let mut fast = Evaluator::new(Engine::Fast, path).with_repeats_skipped(skips);
-                // Twice, because the second evaluation reuses the state that the first has left.
+                // Two evaluations, because the second one reuses the state left by the first.
                 for _ in 0..2 {
                     assert_eq!(
                         fast.evaluate(&genome, &trials),

@@ -1,10 +1,9 @@
 //! Programs that are only linked, never run, so that their contents can be inspected.
 //!
-//! A panic calls a function that does not exist, so a program that contains a panic cannot be
-//! linked.
+//! A panic calls a function that does not exist, so linking a program that contains a panic fails.
 //!
-//! Contains `unsafe` code: that function must be declared, and a board without a device consists only
-//! of addresses, whose contents the compiler must not know.
+//! Uses `unsafe` because that function must be declared, and because a board without a device
+//! consists only of addresses whose contents must be unknown to the compiler.
 #![no_std]
 #![allow(unsafe_code)]
 
@@ -30,7 +29,7 @@ fn panic(_: &PanicInfo<'_>) -> ! {
 /// A register that may hold any value.
 const REGISTER: *mut u32 = 0x4000_0000 as *mut u32;
 
-/// Any value.
+/// Reads a value that the compiler does not know.
 pub fn read() -> u32 {
     // SAFETY: the address of a device; this is never run.
     unsafe { ptr::read_volatile(REGISTER) }
@@ -42,7 +41,7 @@ pub fn write(value: u32) {
     unsafe { ptr::write_volatile(REGISTER, value) }
 }
 
-/// A board of which the compiler knows nothing.
+/// A board whose behaviour the compiler does not know.
 #[derive(Debug)]
 pub struct AnyBoard;
 
@@ -93,11 +92,11 @@ impl Board for AnyBoard {
     }
 }
 
-/// A flash of which the compiler knows nothing.
+/// A flash whose contents the compiler does not know.
 #[derive(Debug)]
 pub struct AnyFlash;
 
-/// The flash has failed.
+/// Error of a flash that has failed.
 #[derive(Debug)]
 pub struct AnyError;
 
@@ -155,7 +154,8 @@ struct Longs {
     _bytes: [u8; 64],
 }
 
-/// The compiler's functions for copying, comparing and clearing memory, which any firmware has.
+/// Calls the compiler's functions for copying, comparing and clearing memory, which any firmware
+/// contains.
 #[inline(never)]
 pub fn use_memory() {
     let mut bytes = [0_u8; 256];

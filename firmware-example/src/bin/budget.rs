@@ -1,10 +1,10 @@
 //! Prints the cost of the controller: instructions, memory and stack. Each line is a key of
-//! `budget.toml` and the worst value found.
+//! `budget.toml` and the maximum value measured.
 //!
 //! Runs under QEMU with `-icount`. The values depend on the compiler, so there is no file with the
 //! expected output; the test `budget` compares them with `budget.toml`.
 //!
-//! Contains `unsafe` code: assembler that starts the clock before any other code.
+//! Uses `unsafe` for assembler that starts the clock before any other code.
 #![no_std]
 #![no_main]
 #![allow(unsafe_code)]
@@ -28,11 +28,11 @@ use minimal_surprise_slots::{Buffer, InUse, Slots};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// Sets of inputs for which the instructions of the activations are counted.
+/// Number of sets of inputs for which the instructions of the activations are counted.
 const INPUT_SETS: u32 = 1000;
-/// Counted steps of each genome.
+/// Number of steps of each genome that are counted.
 const STEPS_PER_GENOME: u32 = 100;
-/// Stack bytes used to test the measurement.
+/// Number of stack bytes used to test the measurement.
 const KNOWN_BYTES: usize = 400;
 
 // Starts the clock at reset: SysTick's reload value, its current value, then control (on, the
@@ -132,7 +132,7 @@ fn main() -> ! {
     board::succeed()
 }
 
-/// The activations of a layer.
+/// Computes the activations of a layer.
 #[inline(never)]
 fn layer(values: &mut [i16; 14]) {
     for value in values {
@@ -140,13 +140,13 @@ fn layer(values: &mut [i16; 14]) {
     }
 }
 
-/// A control step, call and return included.
+/// Runs a control step; the count includes call and return.
 #[inline(never)]
 fn step(controller: &Controller, state: &mut State, sensors: SensorBits) -> Decision {
     controller.step(state, sensors)
 }
 
-/// Returns whether the bytes are a genome.
+/// Returns true if the bytes are a genome.
 #[inline(never)]
 fn decode(bytes: &[u8]) -> bool {
     EncodedGenome::decode(bytes).is_ok()
@@ -159,7 +159,7 @@ fn build(bytes: &[u8]) {
     }
 }
 
-/// The code that a robot runs at its start.
+/// Runs the code that a robot runs at its start.
 #[inline(never)]
 fn start(flash: &mut MemoryFlash, room: &mut Buffer) -> Controller {
     let mut slots = Slots::open(flash, 0, room).expect("there is room");
@@ -173,7 +173,7 @@ fn open(flash: &mut MemoryFlash, room: &mut Buffer) {
     black_box(&start(flash, room));
 }
 
-/// Detects a wrong measurement.
+/// Uses a known amount of stack, to detect wrong measurements.
 #[inline(never)]
 fn known_depth() {
     black_box(&mut [black_box(1_u8); KNOWN_BYTES]);

@@ -1,4 +1,4 @@
-//! Prints how many instructions a layer of activations and a control step take.
+//! Prints the number of instructions of a layer of activations and of a control step.
 //!
 //! Runs under QEMU with `-icount`. The counts depend on the compiler, so there is no file with the
 //! expected output.
@@ -16,10 +16,10 @@ use minimal_surprise_controller::{Controller, Decision, SensorBits, State, Topol
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// Sets of inputs for which the instructions of the activations are counted.
+/// Number of sets of inputs for which the instructions of the activations are counted.
 const INPUT_SETS: u32 = 1000;
 
-/// Counted steps of each genome.
+/// Number of steps of each genome that are counted.
 const STEPS_PER_GENOME: u32 = 100;
 
 #[entry]
@@ -62,8 +62,8 @@ fn main() -> ! {
     board::succeed()
 }
 
-/// The activations of a layer, in a separate function so that its instructions can be counted and
-/// read.
+/// Computes the activations of a layer, in a separate function so that its instructions can be
+/// counted and read.
 #[inline(never)]
 fn layer(values: &mut [i16; 14]) {
     for value in values {
@@ -71,7 +71,7 @@ fn layer(values: &mut [i16; 14]) {
     }
 }
 
-/// A control step, call and return included.
+/// Runs a control step; the count includes call and return.
 #[inline(never)]
 fn step(controller: &Controller, state: &mut State, sensors: SensorBits) -> Decision {
     controller.step(state, sensors)

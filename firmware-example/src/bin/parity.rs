@@ -1,4 +1,4 @@
-//! Prints the hashes of [`firmware_example::parity`] as computed here.
+//! Prints the hashes of [`firmware_example::parity`], computed on the emulated robot.
 //!
 //! The output must equal `parity.out` in this directory.
 #![no_std]

@@ -1,4 +1,4 @@
-//! What a robot's electronics must provide.
+//! The functions that a robot's electronics must provide.
 
 use minimal_surprise_controller::neighbours::Neighbours;
 use minimal_surprise_link::Report;
@@ -6,12 +6,12 @@ use minimal_surprise_link::Report;
 /// Maximum number of neighbours kept in one period.
 pub const NEIGHBOURS_MAX: usize = 16;
 
-/// What the wheels do until the next command.
+/// Motion of the wheels until the next command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
-    /// They stand.
+    /// No motion.
     Stop,
-    /// One cell ahead.
+    /// A move of one cell ahead.
     Ahead,
     /// A quarter turn to the left.
     Left,
@@ -19,13 +19,13 @@ pub enum Motion {
     Right,
 }
 
-/// A robot's electronics, except its flash. No function waits, except [`Board::sleep`].
+/// A robot's electronics, except its flash. Only [`Board::sleep`] waits.
 pub trait Board {
     /// Side of a grid cell, in mm.
     const CELL_MM: f32;
 
-    /// Adds the neighbours detected since the last call; returns whether the detector has delivered
-    /// data since then. If it has, and nothing was added, there is no neighbour.
+    /// Adds the neighbours detected since the last call; returns true if the detector has delivered
+    /// data since then. If it has, and no neighbour was added, none is in range.
     fn detect(&mut self, neighbours: &mut Neighbours<NEIGHBOURS_MAX>) -> bool;
 
     /// Sets the motors.
@@ -34,19 +34,19 @@ pub trait Board {
     /// Returns the next byte from the line, if one has arrived.
     fn receive(&mut self) -> Option<u8>;
 
-    /// Puts a byte on the line; returns whether there was room for it.
+    /// Sends a byte on the line; returns false if the transmit buffer is full.
     fn send(&mut self, byte: u8) -> bool;
 
-    /// Returns whether another control period has begun since the last call.
+    /// Returns true if a new control period has begun since the last call.
     fn period_begun(&mut self) -> bool;
 
     /// Waits until a byte arrives or a control period begins; may return early.
     fn sleep(&mut self);
 
-    /// Feeds the watchdog, which postpones its restart of the robot.
+    /// Feeds the watchdog, so that it does not restart the robot.
     fn feed_watchdog(&mut self);
 
-    /// Returns whether the watchdog has caused the last restart.
+    /// Returns true if the watchdog caused the last restart.
     fn restarted_by_watchdog(&self) -> bool;
 
     /// Logs a status report.

@@ -1,15 +1,15 @@
-//! The firmware of a robot: the control loop, and the answers to its host.
+//! The firmware of a robot: the control loop, and the replies to the host.
 //!
 //! Once per control period: read neighbours, encode them as sensor bits, step, act, report. In
-//! between, the robot answers its host. It stands until the host starts it.
+//! between, the robot replies to its host. It does not move until the host starts it.
 //!
-//! **Safe by itself.** Whatever the genome decides, the robot
+//! **Safety.** Whatever the genome decides, the robot
 //!
-//! - never drives into a cell that its sensors report occupied, or have not reported on since it
-//!   moved;
-//! - stands while its newest neighbour data is older than [`DATA_PERIODS_MAX`] periods;
+//! - never drives into a cell that its sensors report occupied, or have not reported on since the
+//!   robot moved;
+//! - stops while its newest neighbour data is older than [`DATA_PERIODS_MAX`] periods;
 //! - stops its motors before it writes to flash, which may stall the chip;
-//! - is restarted by the watchdog, and then stands, unless it reaches the end of its loop.
+//! - is restarted by the watchdog if it does not reach the end of its loop, and then does not move.
 
 mod board;
 
@@ -25,16 +25,16 @@ use minimal_surprise_link::{
 };
 use minimal_surprise_slots::{Buffer, Defect, PlaceError, Slot, SlotState, Slots, UpdateError};
 
-/// The oldest neighbour data to act on, in control periods.
+/// Maximum age of the neighbour data to act on, in control periods.
 pub const DATA_PERIODS_MAX: u32 = 2;
 
-/// Periods between two log lines of a robot that runs.
+/// Number of periods between two log lines of a running robot.
 const LOG_PERIODS: u32 = 100;
 
 /// The sensor of the cell straight ahead, in every sensor model.
 const AHEAD: u16 = 1;
 
-/// The robot cannot start, because of its board or the location of its slots.
+/// Reason why a robot cannot start: its board or the location of its slots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StartError {
     /// The slots do not fit the flash.
@@ -43,25 +43,28 @@ pub enum StartError {
     Cell(InvalidCellSize),
 }
 
-/// A robot.
+/// A robot: its electronics, its genomes and its line to the host.
 #[derive(Debug)]
 pub struct Robot<B, F> {
     server: Server,
     body: Body<B, F>,
-    /// The answer being sent, its length, and the number of bytes already sent.
+    /// The reply being sent.
     outgoing: [u8; WIRE_BYTES_MAX],
+    /// Length of the reply, in bytes.
     length: usize,
+    /// Number of bytes already sent.
     sent: usize,
 }
 
-/// Everything except the line.
+/// The parts of a robot other than the line.
 #[derive(Debug)]
 struct Body<B, F> {
     board: B,
     cell: CellSize,
     neighbours: Neighbours<NEIGHBOURS_MAX>,
-    /// The newest reading, and its age in periods.
+    /// The newest reading.
     sensors: SensorBits,
+    /// Age of the newest reading, in periods.
     data_periods: u32,
     slots: Slots<F>,
     room: Buffer,
@@ -77,7 +80,7 @@ impl<B: Board, F: NorFlash> Robot<B, F> {
     /// Starts a robot whose genome slots are at `offset` in `flash`.
     ///
     /// # Errors
-    /// [`StartError`].
+    /// [`StartError`] if the board or the location of the slots is invalid.
     pub fn start(mut board: B, flash: F, offset: u32) -> Result<Self, StartError> {
         board.drive(Motion::Stop);
         let cell = CellSize::from_mm(B::CELL_MM).map_err(StartError::Cell)?;
@@ -121,7 +124,7 @@ impl<B: Board, F: NorFlash> Robot<B, F> {
         }
     }
 
-    /// Runs the loop once.
+    /// Runs one pass of the loop.
     pub fn go_round(&mut self) {
         let idle = self.talk();
         if self.body.board.period_begun() {
@@ -132,17 +135,17 @@ impl<B: Board, F: NorFlash> Robot<B, F> {
         }
     }
 
-    /// The board.
+    /// Returns the board.
     pub fn board(&mut self) -> &mut B {
         &mut self.body.board
     }
 
-    /// Takes a byte from the line and puts bytes on it; returns whether there was nothing to do.
+    /// Takes a byte from the line and sends bytes; returns true if there was nothing to do.
     fn talk(&mut self) -> bool {
         let answer = self.outgoing.get(self.sent..self.length).unwrap_or(&[]);
         for &byte in answer {
             if !self.body.board.send(byte) {
-                // No byte is taken until the answer is sent; the host waits for it.
+                // No byte is taken until the reply is sent; the host waits for the reply.
                 return false;
             }
             self.sent += 1;
@@ -163,7 +166,7 @@ impl<B: Board, F: NorFlash> Robot<B, F> {
 }
 
 impl<B: Board, F: NorFlash> Body<B, F> {
-    /// One control period.
+    /// Runs one control period.
     fn period(&mut self) {
         self.neighbours.clear();
         if self.board.detect(&mut self.neighbours) {
@@ -194,9 +197,9 @@ impl<B: Board, F: NorFlash> Body<B, F> {
         };
     }
 
-    /// What the robot does: what was decided, unless it might collide. The cell ahead counts as
-    /// occupied unless the data of this period says otherwise: the robot has moved since older
-    /// data.
+    /// Returns the motion of the robot: the decision, unless it might cause a collision. The cell
+    /// ahead counts as occupied unless the data of this period reports it free: the robot has moved
+    /// since older data was measured.
     fn guarded(&mut self, decision: Decision) -> Motion {
         match (decision.action, decision.turn) {
             (Action::Straight, _) if self.data_periods > 0 || self.sensors.bits() & AHEAD != 0 => {
@@ -243,7 +246,7 @@ impl<B: Board, F: NorFlash> Body<B, F> {
         }
     }
 
-    /// The refusal of a failed update; records a flash fault.
+    /// Returns the refusal for a failed update; records a flash fault.
     fn refusal(&mut self, error: UpdateError<F::Error>) -> Refusal {
         let refusal = refusal(&error);
         if refusal == Refusal::Flash {
@@ -253,7 +256,7 @@ impl<B: Board, F: NorFlash> Body<B, F> {
     }
 }
 
-/// The refusal of a failed update.
+/// Returns the refusal for a failed update.
 #[must_use]
 pub fn refusal<E: core::fmt::Debug>(error: &UpdateError<E>) -> Refusal {
     match *error {
@@ -271,7 +274,7 @@ pub fn refusal<E: core::fmt::Debug>(error: &UpdateError<E>) -> Refusal {
     }
 }
 
-/// The genome that the robot runs, as reported to a host.
+/// Returns the genome that the robot runs, as reported to a host.
 #[must_use]
 pub fn genome_in_use<F: NorFlash>(slots: &Slots<F>) -> GenomeInUse {
     match slots.newest() {
@@ -304,7 +307,7 @@ impl<B: Board, F: NorFlash> Handler for Body<B, F> {
 
     fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal> {
         self.standing()?;
-        // The chip may stall for seconds, during which turning wheels would keep turning.
+        // The chip may stall for seconds, and the wheels would keep turning.
         self.board.drive(Motion::Stop);
         let begun = self.slots.begin(length, crc);
         begun.map_err(|error| self.refusal(error))
@@ -322,7 +325,7 @@ impl<B: Board, F: NorFlash> Handler for Body<B, F> {
         let write_count = committed.map_err(|error| self.refusal(error))?;
         self.controller = self.slots.in_use(&mut self.room).controller();
         self.state = State::new(&self.controller);
-        // Sensor bits have a different meaning for another model.
+        // Sensor bits have a different meaning for a different model.
         self.data_periods = DATA_PERIODS_MAX;
         self.sensors = SensorBits::NONE;
         Ok(write_count)

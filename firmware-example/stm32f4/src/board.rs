@@ -1,4 +1,4 @@
-//! The board as the robot's loop sees it.
+//! The board that the robot's loop uses.
 
 use firmware_example::range_bearing::RangeBearing;
 use firmware_example::robot::{Board, Motion, NEIGHBOURS_MAX};
@@ -11,9 +11,10 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 use crate::interrupts;
 
-/// The processor's clock: half of the chip's maximum, so that SysTick can count a second.
+/// Frequency of the processor's clock: half of the chip's maximum, so that SysTick can count a
+/// second.
 pub(crate) const CLOCK_HZ: u32 = 84_000_000;
-/// Control periods per second.
+/// Number of control periods per second.
 pub(crate) const CONTROL_HZ: u32 = 1;
 /// Side of a grid cell, in mm.
 pub(crate) const CELL_MM: f32 = 100.0;
@@ -24,8 +25,9 @@ pub(crate) struct Stm32F4 {
     watchdog: IndependentWatchdog,
     restarted_by_watchdog: bool,
     module: RangeBearing,
-    /// The newest scan, and whether the loop has not seen it yet.
+    /// The newest scan.
     scan: Neighbours<NEIGHBOURS_MAX>,
+    /// True until the loop has read the scan.
     scan_is_new: bool,
 }
 
@@ -45,7 +47,7 @@ impl Stm32F4 {
         }
     }
 
-    /// Reads the bytes from the module. If a period has several scans, the newest counts.
+    /// Reads the bytes from the module. If a period has several scans, the newest one is used.
     fn take_scans(&mut self) {
         while let Some(byte) = interrupts::byte_from_module() {
             self.scan_is_new |= self.module.feed(byte, &mut self.scan);
@@ -71,7 +73,8 @@ impl Board for Stm32F4 {
     }
 
     fn receive(&mut self) -> Option<u8> {
-        // Called more often than once per period, otherwise the module's bytes would pile up.
+        // `receive` is called more often than once per period, so the module's bytes do not pile
+        // up.
         self.take_scans();
         interrupts::byte_from_line()
     }

@@ -1,6 +1,6 @@
-//! Stops the wheels in every fault.
+//! Functions that stop the wheels in every fault.
 //!
-//! Contains `unsafe` code: the wheels' registers are addresses.
+//! Uses `unsafe` because the wheels' registers are addresses.
 #![allow(unsafe_code)]
 
 use core::panic::PanicInfo;
@@ -9,18 +9,18 @@ use defmt_rtt as _;
 use firmware_example::fault_handlers;
 use firmware_example::faults::{Fault, WheelsOff};
 
-/// Port C: the registers that select its program-controlled outputs, and that set and clear pins.
+/// Registers of port C: one selects its program-controlled outputs, the other sets and clears pins.
 const GPIOC_MODER: u32 = 0x4002_0800;
 const GPIOC_BSRR: u32 = 0x4002_0818;
 
-/// Sets PC6 to PC9, speed and direction of both wheels, low and makes them program-controlled
-/// outputs, which disconnects the timer. Nothing else is on port C; its other pins are inputs, as
-/// after a reset.
+/// Register writes that set PC6 to PC9, speed and direction of both wheels, low and make them
+/// program-controlled outputs, which disconnects the timer. All other pins of port C are unused
+/// inputs, as after a reset.
 // SAFETY: only the wheels' pins are affected.
 static WHEELS_OFF: WheelsOff<2> =
     unsafe { WheelsOff::new([[GPIOC_BSRR, 0x03c0_0000], [GPIOC_MODER, 0x0005_5000]]) };
 
-/// Stops the wheels and waits for the watchdog's restart, which is reported to the host.
+/// Stops the wheels and waits for the restart by the watchdog, which is reported to the host.
 pub(crate) fn stand() -> ! {
     interrupt::disable();
     WHEELS_OFF.write();

@@ -11,16 +11,16 @@ use stm32f4xx_hal::pac::FLASH;
 /// Offset of the slots in the chip's flash, in bytes.
 const SLOTS_AT: u32 = SLOT_0_ADDRESS - FLASH_ADDRESS;
 
-/// The slots' sectors. Offset 0 is the address of slot 0. The processor waits while the flash
+/// The slots' sectors. Offset 0 is the address of slot 0. The processor stalls while the flash
 /// erases or writes.
 pub(crate) struct SlotFlash {
     chip: FLASH,
 }
 
-/// What can go wrong.
+/// Error of the slots' flash.
 #[derive(Debug)]
 pub(crate) enum SlotFlashError {
-    /// Out of bounds or not aligned.
+    /// The access is out of bounds or not aligned.
     Place(NorFlashErrorKind),
     /// The chip reports an error.
     Chip(Error),
@@ -46,7 +46,7 @@ impl SlotFlash {
         Self { chip }
     }
 
-    /// The chip keeps its error flags until they are cleared, and refuses to work until then.
+    /// Clears the chip's error flags; while one is set, the chip rejects further operations.
     fn clear_errors(&mut self) {
         self.chip.sr().write(|w| {
             w.pgserr().clear_bit_by_one();
@@ -57,7 +57,7 @@ impl SlotFlash {
         });
     }
 
-    /// The processor's data cache does not notice that the flash was erased.
+    /// Clears the processor's data cache, which is not updated when the flash is erased.
     fn clear_cache(&mut self) {
         let acr = self.chip.acr();
         acr.modify(|_, w| w.dcen().clear_bit());
@@ -83,7 +83,7 @@ impl ReadNorFlash for SlotFlash {
         Ok(())
     }
 
-    /// Bytes; 0 if the chip has less flash than it should.
+    /// Returns the size in bytes, or 0 if the chip has less flash than expected.
     fn capacity(&self) -> usize {
         let end = (SLOTS_AT + SLOTS_BYTES) as usize;
         if self.chip.len() >= end {

@@ -1,6 +1,6 @@
-//! Interrupts: bytes arrive, and control periods begin, while the loop runs.
+//! Interrupts for events during the loop: arriving bytes and the start of control periods.
 //!
-//! Contains `unsafe` code: unmasking interrupts is unsafe. It accesses no memory.
+//! Uses `unsafe` to unmask interrupts; this accesses no memory.
 #![allow(unsafe_code)]
 
 use core::cell::RefCell;
@@ -18,14 +18,14 @@ use stm32f4xx_hal::serial::{Instance, Rx};
 
 use crate::wheels::Wheels;
 
-/// Number of bytes kept until the loop takes them: more than a frame on either line. Further bytes
-/// are lost, as on the line.
+/// Maximum number of bytes kept until the loop takes them; larger than a frame on either line.
+/// Further bytes are lost, as if damaged on the line.
 const BYTES_MAX: usize = 256;
 
-/// The state shared by loop and interrupts; `None` before it is initialised.
+/// State shared by the loop and the interrupts; `None` until initialised.
 type Shared<T> = Mutex<RefCell<Option<T>>>;
 
-/// A serial line's receiver and what it has received.
+/// A serial line's receiver and the bytes received.
 struct Receiver<U: Instance> {
     rx: Rx<U>,
     bytes: Deque<u8, BYTES_MAX>,
@@ -54,7 +54,7 @@ pub(crate) fn take_wheels(wheels: Wheels) {
     drive(Motion::Stop);
 }
 
-/// Sets the wheels.
+/// Sets the motion of the wheels.
 pub(crate) fn drive(motion: Motion) {
     with(&WHEELS, |wheels| wheels.drive(motion));
 }
@@ -73,22 +73,22 @@ pub(crate) fn listen(mut line: Rx<USART2>, mut module: Rx<USART3>) {
     }
 }
 
-/// The next byte from the host, if one has arrived.
+/// Returns the next byte from the host, if one has arrived.
 pub(crate) fn byte_from_line() -> Option<u8> {
     with(&LINE, |line| line.bytes.pop_front()).flatten()
 }
 
-/// The next byte from the range-and-bearing module, if one has arrived.
+/// Returns the next byte from the range-and-bearing module, if one has arrived.
 pub(crate) fn byte_from_module() -> Option<u8> {
     with(&MODULE, |module| module.bytes.pop_front()).flatten()
 }
 
-/// Returns whether a control period has begun since the last call.
+/// Returns true if a control period has begun since the last call.
 pub(crate) fn take_period() -> bool {
     PERIOD_BEGUN.swap(false, Ordering::Relaxed)
 }
 
-/// Waits for an interrupt, unless there is already something to do.
+/// Waits for an interrupt, unless an event is already pending.
 pub(crate) fn sleep() {
     critical_section::with(|_| {
         let nothing = |bytes: Option<bool>| bytes.unwrap_or(true);
@@ -96,8 +96,8 @@ pub(crate) fn sleep() {
             && nothing(with(&MODULE, |module| module.bytes.is_empty()))
             && !PERIOD_BEGUN.load(Ordering::Relaxed);
         if idle {
-            // An interrupt wakes the processor here and is taken after the critical section, so
-            // none can occur between the check and the sleep.
+            // An interrupt wakes the processor here and is taken after the critical section, so no
+            // interrupt is handled between the check and the sleep.
             asm::wfi();
         }
     });
@@ -113,7 +113,8 @@ impl<U: Instance> Receiver<U> {
         loop {
             match self.rx.read() {
                 Ok(byte) => {
-                    // If there is no room, the byte is lost and the frame's CRC detects it.
+                    // If the buffer is full, the byte is lost, and the frame's CRC detects the
+                    // loss.
                     let _ = self.bytes.push_back(byte);
                 }
                 Err(nb::Error::WouldBlock) => return,
@@ -134,8 +135,8 @@ fn USART3() {
     with(&MODULE, Receiver::receive);
 }
 
-/// A control period begins. Wheels that have received no command for a whole period are stopped:
-/// the watchdog would take seconds.
+/// Begins a control period. Stops wheels that have received no command for a whole period: the
+/// watchdog would take seconds to do so.
 #[exception]
 fn SysTick() {
     if PERIOD_BEGUN.swap(true, Ordering::Relaxed) {

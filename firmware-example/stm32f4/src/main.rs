@@ -1,8 +1,8 @@
 //! The robot, on an STM32F405 or STM32F407 with 1 MiB of flash.
 //!
-//! **Not run on hardware yet.** It builds, and the tests run its loop, its slots and its line in an
-//! emulator; the code added by this package has only been built and checked against the HAL's
-//! sources. `docs/robot.md` describes the wiring and the first tests.
+//! **Not run on hardware yet.** The firmware builds, and the tests run its loop, its slots and its
+//! line in an emulator; the code added by this package has only been built and checked against the
+//! HAL's sources. `docs/robot.md` describes the wiring and the first tests.
 //!
 //! ```text
 //! cd firmware-example/stm32f4
@@ -29,14 +29,14 @@ use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 use wheels::{PWM_HZ, Wheel, Wheels};
 
-/// Bits per second of both serial lines; 8 data bits, no parity, 1 stop bit.
+/// Speed of both serial lines, in bits per second; 8 data bits, no parity, 1 stop bit.
 const BAUD: u32 = 115_200;
 
-/// The watchdog's time-out at its nominal clock. It must exceed the time to erase a sector, 4 s at
-/// most, even at the fastest clock: 47 kHz instead of 32 kHz shortens it to 5.4 s.
+/// The watchdog's time-out at its nominal clock. It must exceed the time to erase a sector (maximum
+/// 4 s) even at the fastest clock: 47 kHz instead of 32 kHz shortens the time-out to 5.4 s.
 const WATCHDOG_MS: u32 = 8_000;
 
-/// SysTick counts every eighth tick of the processor's clock.
+/// SysTick's reload value; SysTick counts every eighth tick of the processor's clock.
 const SYSTICK_RELOAD: u32 = CLOCK_HZ / 8 / CONTROL_HZ - 1;
 const _: () = assert!(SYSTICK_RELOAD < 1 << 24, "SysTick has 24 bits");
 
@@ -86,8 +86,7 @@ fn main() -> ! {
     systick.enable_interrupt();
     systick.enable_counter();
 
-    // For a debugger: it may read memory while the processor sleeps, and halt the processor for any
-    // time.
+    // Lets a debugger read memory while the processor sleeps, and halt the processor for any time.
     chip.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
     let mut watchdog = IndependentWatchdog::new(chip.IWDG);
     watchdog.stop_on_debug(&chip.DBGMCU, true);

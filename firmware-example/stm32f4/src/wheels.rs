@@ -1,7 +1,7 @@
-//! Two wheels behind a motor driver that takes a speed (PWM) and a direction for each.
+//! Two wheels driven by a motor driver that takes a speed (PWM) and a direction for each wheel.
 //!
-//! Nothing measures how far they turn: the length of a move depends only on the constants here,
-//! which a builder must set first.
+//! The rotation of the wheels is not measured: the length of a move depends only on the constants
+//! here, which a builder must set first.
 
 use firmware_example::robot::Motion;
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
@@ -18,13 +18,13 @@ const FULL_MM_PER_S: f32 = 130.0;
 /// Distance between the two wheels, in mm.
 const TRACK_MM: f32 = 53.0;
 
-/// Duties in 1/1000. A move takes one control period.
+/// Duty of a move of one cell ahead, in 1/1000. A move takes one control period.
 const AHEAD: i16 = permille(CELL_MM * CONTROL_HZ as f32);
-/// A quarter turn on the spot: each wheel travels a quarter of the circle whose diameter is the
-/// track.
+/// Duty of a quarter turn on the spot, in 1/1000: each wheel travels a quarter of the circle whose
+/// diameter is the track.
 const TURN: i16 = permille(core::f32::consts::FRAC_PI_4 * TRACK_MM * CONTROL_HZ as f32);
 
-/// The duty for a speed in mm/s.
+/// Returns the duty for a speed in mm/s, in 1/1000.
 const fn permille(mm_per_s: f32) -> i16 {
     let duty = 1000.0 * mm_per_s / FULL_MM_PER_S;
     assert!(
@@ -36,9 +36,9 @@ const fn permille(mm_per_s: f32) -> i16 {
 
 /// One wheel.
 pub(crate) struct Wheel {
-    /// Its PWM channel.
+    /// PWM channel of the wheel.
     pub(crate) speed: ErasedChannel<TIM3>,
-    /// High if the wheel turns forwards.
+    /// Output that is high if the wheel turns forwards.
     pub(crate) ahead: ErasedPin<Output>,
 }
 

@@ -1,4 +1,4 @@
-//! Actions by table: the action network is a function of a window, shared by all robots and
+//! Table of actions: the action network is a function of a window, shared by all robots and
 //! repetitions of a genome.
 
 use super::path::EnginePath;
@@ -7,18 +7,18 @@ use super::window::{WINDOWS, WindowOrder};
 use minimal_surprise_controller::{Action, Controller, Turn};
 
 /// An action as the top byte of the addend for a robot word: bit 7 is the action, bits 5 and 6 are
-/// the turn (0, 1 or 3 quarters), and bit 0 is set until the entry is computed.
+/// the turn (0, 1 or 3 quarter turns), and bit 0 is set until the entry is computed.
 type Entry = u8;
 
 const NOT_ASKED: Entry = 1;
 
-/// Bits that an entry is shifted by when it is added to a robot word.
+/// Number of bits that an entry is shifted by when it is added to a robot word.
 pub(super) const ENTRY_SHIFT: u32 = 24;
-/// A quarter turn to the left.
+/// Entry of a quarter turn to the left.
 pub(super) const TURN_LEFT: Entry = to_entry(Action::Turn, Turn::CounterClockwise);
-/// A quarter turn to the right.
+/// Entry of a quarter turn to the right.
 pub(super) const TURN_RIGHT: Entry = to_entry(Action::Turn, Turn::Clockwise);
-/// Going straight.
+/// Entry of going straight.
 pub(super) const STRAIGHT: Entry = to_entry(Action::Straight, Turn::Clockwise);
 
 const fn to_entry(action: Action, turn: Turn) -> Entry {
@@ -32,7 +32,7 @@ const fn to_entry(action: Action, turn: Turn) -> Entry {
     }
 }
 
-/// The actions of one action network, computed on first use or all at once.
+/// The actions of one action network, each computed on first use or all at once.
 #[derive(Clone, Debug)]
 pub(super) struct ActionTable {
     /// One entry per window, plus three bytes so that each entry can be read as part of a word.
@@ -46,8 +46,8 @@ impl ActionTable {
         }
     }
 
-    /// Replaces the last genome. On AVX-512 all entries are computed at once; on other paths on
-    /// first use, because few are used.
+    /// Replaces the last genome. On AVX-512, all entries are computed at once; on other paths, each
+    /// on first use, because only a few are used.
     pub(super) fn prepare(
         &mut self,
         path: EnginePath,
@@ -61,13 +61,13 @@ impl ActionTable {
         }
     }
 
-    /// All entries, plus three bytes.
+    /// Returns all entries, plus three bytes.
     #[cfg(target_arch = "x86_64")]
     pub(super) fn entries(&self) -> &[Entry] {
         &self.entries
     }
 
-    /// The entry of a window, computed by the controller if missing.
+    /// Returns the entry of a window; computes it with the controller if missing.
     #[inline]
     pub(super) fn get(&mut self, window: u16, order: &WindowOrder, controller: &Controller) -> u32 {
         let entry = &mut self.entries[usize::from(window)];

@@ -3,29 +3,29 @@
 //!
 //! If the robot faces east or north, its window is read directly: `rows` has the lines y = 0, 1, …
 //! with x increasing along them; `columns` has the lines x = W − 1, W − 2, … with y increasing
-//! along them, so that in both the line before is on the robot's right. If the robot faces west or
+//! along them. So in both, the preceding line is on the robot's right. If the robot faces west or
 //! south, the window is rotated by half a turn: its 15 bits are in reverse order.
 
 use super::robot_word;
 use crate::torus::Grid;
 
-/// Lines of bits with a border that repeats the cells across the edges: two bits at either end of a
+/// Lines of bits with a border that repeats the cells across the edges: two bits at both ends of a
 /// line, one line before the first and one after the last.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plane {
-    /// Cells along a line.
+    /// Number of cells along a line.
     side: u32,
     lines: u32,
     words_per_line: usize,
-    /// One word more than the lines need, because any five bits may be read from two words.
+    /// Lines of bits, plus one word, because any five bits may be read from two words.
     bits: Vec<u32>,
 }
 
-/// Width of the border at either end of a line.
+/// Width of the border at both ends of a line.
 const BORDER: u32 = 2;
 
 impl Plane {
-    /// Length of the longest lines that fit into one word.
+    /// Maximum length of lines that fit into one word.
     pub(super) const SIDE_MAX_ONE_WORD: u32 = 32 - 2 * BORDER;
 
     fn reset(&mut self, side: u32, lines: u32) {
@@ -37,7 +37,7 @@ impl Plane {
             .resize((lines as usize + 2) * self.words_per_line + 1, 0);
     }
 
-    /// The lines, starting at −1, each of [`Plane::words_per_line`] words, plus one word.
+    /// Returns the lines, starting at −1, each of [`Plane::words_per_line`] words, plus one word.
     pub(super) fn words(&self) -> &[u32] {
         &self.bits
     }
@@ -54,7 +54,7 @@ impl Plane {
         self.lines
     }
 
-    /// Word and bit of a cell. `ONE_WORD`: all lines are single words.
+    /// Returns the word and the bit of a cell. `ONE_WORD`: all lines are single words.
     #[inline]
     fn place<const ONE_WORD: bool>(&self, line: u32, along: u32) -> (usize, u32) {
         let bit = along + BORDER;
@@ -79,7 +79,8 @@ impl Plane {
         self.bits[word] & mask != 0
     }
 
-    /// Cells `along` − 2 to `along` + 2 of the lines before, at and after `line`, five bits each.
+    /// Returns the cells `along` − 2 to `along` + 2 of the lines before, at and after `line`, five
+    /// bits each.
     #[inline]
     fn window(&self, line: u32, along: u32) -> u16 {
         let mut window = 0;
@@ -121,7 +122,7 @@ impl Plane {
     }
 }
 
-/// Both planes.
+/// The rows and the columns.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Board {
     width: u32,
@@ -138,7 +139,7 @@ impl Board {
         self.columns.reset(self.height, self.width);
     }
 
-    /// Returns whether a line of either plane is a single word.
+    /// Returns true if a line of either plane is a single word.
     pub(super) fn is_narrow(&self) -> bool {
         self.width.max(self.height) <= Plane::SIDE_MAX_ONE_WORD
     }
@@ -160,7 +161,7 @@ impl Board {
         self.columns.close_edges();
     }
 
-    /// The window of a robot, the bit of its own cell set. Borders must be up to date.
+    /// Returns the window of a robot, with the bit of its own cell set. Borders must be up to date.
     #[inline]
     pub(super) fn window(&self, robot: u32) -> u16 {
         let (x, y) = (robot_word::x(robot), robot_word::y(robot));
@@ -178,7 +179,7 @@ impl Board {
     }
 
     /// Moves each of the listed robots one cell ahead, one after the other, unless the cell is
-    /// taken. Does not update borders.
+    /// occupied. Does not update borders.
     pub(super) fn advance(&mut self, movers: &[u32], robots: &mut [u32]) {
         if self.is_narrow() {
             self.advance_each::<true>(movers, robots);
@@ -188,7 +189,7 @@ impl Board {
     }
 
     fn advance_each<const ONE_WORD: bool>(&mut self, movers: &[u32], robots: &mut [u32]) {
-        // Headings are too mixed for branch prediction, so there are no branches on them.
+        // Headings are too mixed for branch prediction, so the code does not branch on them.
         static AHEAD: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
         let (width, height) = (self.width, self.height);
         let across_the_edge = |to: u32, side: u32| {

@@ -1,4 +1,4 @@
-//! Evaluations with a choice of engine.
+//! Evaluations with either engine.
 
 use super::actions::ActionTable;
 use super::every_step::Groups;
@@ -20,30 +20,30 @@ use crate::world::check_poses;
 use minimal_surprise_controller::{Controller, Genome, SensorModel};
 use std::sync::OnceLock;
 
-/// Longest recording that is stored as a whole, in words of four robot-steps: 8 MB.
+/// Maximum length of a recording that is stored as a whole, in words of four robot-steps: 8 MB.
 const RECORDING_WORDS_MAX: usize = 1 << 20;
-/// Recordings processed in parts have about this many words, so that they stay in the cache.
+/// Approximate size of the parts of longer recordings, in words, so that a part stays in the cache.
 const PART_WORDS: usize = 1 << 15;
 /// Minimum length of a part: with shorter ones, prediction states would be moved in and out of the
 /// cache too often.
 const PART_BLOCKS_MIN: usize = 4;
-/// Robots of small swarms that are processed together.
+/// Number of robots of small swarms that are processed together.
 const ROBOTS_TOGETHER: usize = 1 << 12;
 /// Maximum number of flips stored for a trial: 8 MB.
 const FLIPS_MAX: usize = 1 << 22;
 
-/// Which engine evaluates. All give the same results.
+/// The engine that evaluates. All engines give the same results.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Engine {
     /// The reference engine: [`evaluation::evaluate`].
     Plain,
-    /// The fast engine, this module.
+    /// The fast engine, implemented in this module.
     #[default]
     Fast,
 }
 
-/// The trials of a generation, and what the fast engine prepares once for all of its genomes. Can
-/// be shared between threads.
+/// The trials of a generation, and data that the fast engine prepares once for all genomes. Can be
+/// shared between threads.
 #[derive(Debug)]
 pub struct TrialSet {
     scenario: Scenario,
@@ -53,14 +53,14 @@ pub struct TrialSet {
 }
 
 impl TrialSet {
-    /// Trials for genomes of the given sensor model.
+    /// Prepares trials for genomes of the given sensor model.
     ///
     /// # Panics
-    /// If there is no trial, or a trial's poses do not match the scenario's number of robots or its
+    /// If `trials` is empty, or a trial's poses do not match the scenario's number of robots or its
     /// grid.
     #[must_use]
     pub fn new(scenario: Scenario, model: SensorModel, trials: Vec<Trial>) -> Self {
-        assert!(!trials.is_empty(), "there is at least one trial");
+        assert!(!trials.is_empty(), "`trials` is not empty");
         for trial in &trials {
             assert_eq!(trial.starts.len(), scenario.robots() as usize);
             check_poses(scenario.grid(), &trial.starts)
@@ -74,13 +74,13 @@ impl TrialSet {
         }
     }
 
-    /// The scenario.
+    /// Returns the scenario.
     #[must_use]
     pub fn scenario(&self) -> &Scenario {
         &self.scenario
     }
 
-    /// The trials.
+    /// Returns the trials.
     #[must_use]
     pub fn trials(&self) -> &[Trial] {
         &self.trials
@@ -109,7 +109,7 @@ impl TrialSet {
     }
 }
 
-/// Evaluates genomes and keeps buffers between evaluations. Use one per thread.
+/// Evaluates genomes and keeps buffers between evaluations. Use one evaluator per thread.
 pub struct Evaluator {
     engine: Engine,
     skips_repeats: bool,
@@ -122,7 +122,7 @@ pub struct Evaluator {
 }
 
 impl Evaluator {
-    /// An evaluator that uses the given path; the plain engine ignores it.
+    /// Creates an evaluator that uses the given path; the plain engine ignores the path.
     #[must_use]
     pub fn new(engine: Engine, path: EnginePath) -> Self {
         Self {
@@ -137,15 +137,15 @@ impl Evaluator {
         }
     }
 
-    /// Whether to skip computation once a world, or a robot in it, repeats itself. On by default;
-    /// does not change results.
+    /// Sets whether the engine skips computation once a world, or a robot in it, repeats a state.
+    /// On by default; does not change results.
     #[must_use]
     pub fn with_repeats_skipped(mut self, skips: bool) -> Self {
         self.skips_repeats = skips;
         self
     }
 
-    /// A genome's fitness over all trials, as returned by [`evaluation::evaluate`].
+    /// Returns a genome's fitness over all trials, as returned by [`evaluation::evaluate`].
     ///
     /// # Panics
     /// If the trials are for a different sensor model.
@@ -157,18 +157,18 @@ impl Evaluator {
         let (worst_repetition, &matches) = (0..)
             .zip(&self.matches)
             .min_by_key(|&(_, matches)| matches)
-            .expect("there is at least one trial");
+            .expect("`trials` is not empty");
         Evaluation {
             matches,
             worst_repetition,
         }
     }
 
-    /// How the robots of one repetition move, and their final poses, as returned by
+    /// Returns the motion of the robots in one repetition, and their final poses, as returned by
     /// [`evaluation::motion`]. The fast engine runs only the world, without predictions.
     ///
     /// # Panics
-    /// If the trials are for a different sensor model, or there is no such repetition.
+    /// If the trials are for a different sensor model, or `repetition` is out of range.
     pub fn motion(
         &mut self,
         genome: &Genome,
@@ -239,7 +239,7 @@ impl Evaluator {
     }
 }
 
-/// One genome's evaluation.
+/// The evaluation of one genome.
 struct Run<'a> {
     evaluator: &'a mut Evaluator,
     controller: &'a Controller,
@@ -303,7 +303,7 @@ impl Run<'_> {
         }
     }
 
-    /// Records and counts some steps of a few repetitions at a time.
+    /// Records a few repetitions in parts of some steps, and counts the matches of each part.
     fn in_parts(&mut self, repetitions_at_once: usize) {
         let (robots, steps) = (self.trials.robots(), self.trials.steps());
         let Evaluator {

@@ -21,7 +21,7 @@ impl Groups {
         self.matched.resize(robots.next_multiple_of(LANES), 0);
     }
 
-    /// Processes the `steps` recorded.
+    /// Processes the recorded `steps`.
     pub(super) fn advance(&mut self, predictor: &Predictor, recording: &Recording, steps: usize) {
         let whole_blocks = steps / BLOCK_STEPS;
         let robots = recording.robots();
@@ -58,7 +58,7 @@ impl Groups {
         self.started = true;
     }
 
-    /// Matches of each robot.
+    /// Returns the number of matches of each robot.
     pub(super) fn matched(&self) -> &[u64] {
         &self.matched
     }

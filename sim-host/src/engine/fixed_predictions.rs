@@ -1,4 +1,4 @@
-//! Predefined predictions: there is no network, so blocks are compared with a constant.
+//! Predefined predictions: without a network, blocks are compared with a constant.
 
 use super::lanes::BLOCK_STEPS;
 use super::recording::Recording;

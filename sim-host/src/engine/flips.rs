@@ -1,22 +1,22 @@
-//! Noise, drawn once for all genomes of a generation: which bits are flipped depends on trial,
-//! step and robot only.
+//! Noise, drawn once for all genomes of a generation: the flipped bits depend only on trial, step
+//! and robot.
 
 use super::window::WindowOrder;
 use crate::noise::NoiseStream;
 use minimal_surprise_controller::SensorBits;
 
-/// Where a swarm's flipped bits come from, in window order.
+/// Source of a swarm's flipped bits, in window order.
 pub(super) enum FlipSource<'a> {
     /// No noise.
     None,
     /// One row per step, already drawn.
     Known(&'a [u16]),
-    /// Too many to store; drawn on demand.
+    /// Too many flips to store; they are drawn on demand.
     Drawn(Box<Drawer<'a>>),
 }
 
 impl FlipSource<'_> {
-    /// The flipped bits of all robots in one step.
+    /// Returns the flipped bits of all robots in one step; `None` without noise.
     pub(super) fn row(&mut self, step: usize, robots: usize) -> Option<&[u16]> {
         match self {
             Self::None => None,
@@ -26,7 +26,7 @@ impl FlipSource<'_> {
     }
 }
 
-/// Draws flipped bits step by step.
+/// Generator of flipped bits, step by step.
 pub(super) struct Drawer<'a> {
     noise: NoiseStream,
     order: &'a WindowOrder,
@@ -56,7 +56,7 @@ impl<'a> Drawer<'a> {
         &self.row
     }
 
-    /// The rows of all steps.
+    /// Draws the rows of all steps.
     pub(super) fn draw_all(mut self, steps: usize, robots: usize) -> Vec<u16> {
         let mut rows = Vec::with_capacity(steps * robots);
         for step in 0..steps {

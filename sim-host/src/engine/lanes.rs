@@ -1,7 +1,7 @@
 //! Lanes: the prediction networks of 32 robots, computed side by side, four steps at a time.
 //!
-//! A robot's inputs of four steps are one 64-bit word, a *block*. The caller decides which robot is
-//! in which lane, and at which time: lanes are independent of each other.
+//! A robot's inputs of four steps are one 64-bit word, a *block*. The caller assigns robots and
+//! times to lanes: lanes are independent of each other.
 
 use super::network::PredictionWeights;
 use super::path::EnginePath;
@@ -10,11 +10,11 @@ use super::portable;
 use super::x86;
 use minimal_surprise_controller::network::MAX_HIDDEN;
 
-/// Robots side by side.
+/// Number of robots computed side by side.
 pub(super) const LANES: usize = 32;
-/// Steps of a block.
+/// Number of steps of a block.
 pub(super) const BLOCK_STEPS: usize = 4;
-/// Pairs of hidden neurons: factors come in pairs, because that is how vector units multiply.
+/// Number of pairs of hidden neurons: factors come in pairs because vector units multiply pairs.
 pub(super) const PAIRS: usize = MAX_HIDDEN / 2;
 
 /// The state of 32 robots between steps: hidden activations 2p (low half) and 2p + 1 (high half) of
@@ -29,33 +29,33 @@ pub(super) struct Lanes {
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct Blocks {
-    /// Their inputs, the first step in the lowest 16 bits.
+    /// Inputs of the robots, the first step in the lowest 16 bits.
     pub(super) inputs: [u64; LANES],
-    /// One bit per lane, set if its robot is before its first step, so that its prediction is
-    /// fixed.
+    /// One bit per lane, set if the robot in the lane is before its first step, so that its
+    /// prediction is fixed.
     pub(super) starting: u32,
-    /// Matches in this many steps (0 to 3) are also counted separately.
+    /// Number of steps (0 to 3) whose matches are also counted separately.
     pub(super) first_steps: usize,
 }
 
-/// How many bits matched in a block, lane by lane.
+/// Number of matching bits in a block, lane by lane.
 #[derive(Clone, Debug, Default)]
 #[repr(align(64))]
 pub(super) struct Matches {
     pub(super) block: [u16; LANES],
-    /// In the first `first_steps` steps only.
+    /// Number of matching bits in the first `first_steps` steps only.
     pub(super) first_steps: [u16; LANES],
 }
 
 impl Lanes {
-    /// Robots before their first step.
+    /// Creates the state of robots before their first step.
     pub(super) fn at_start() -> Self {
         Self {
             hidden: [[0; LANES]; PAIRS],
         }
     }
 
-    /// Puts a robot before its first step into a lane.
+    /// Resets a lane to a robot before its first step.
     pub(super) fn restart(&mut self, lane: usize) {
         for pair in &mut self.hidden {
             pair[lane] = 0;
@@ -63,7 +63,7 @@ impl Lanes {
     }
 }
 
-/// A genome's prediction network, laid out for a path.
+/// A genome's prediction network, in the layout of a path.
 pub(super) enum Predictor {
     Portable(Box<portable::Network>),
     #[cfg(target_arch = "x86_64")]

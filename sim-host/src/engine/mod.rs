@@ -3,12 +3,12 @@
 //!
 //! | optimisation | where |
 //! |---|---|
-//! | the cells around a robot are cut out of rows of bits | `board`, `window` |
+//! | the cells around a robot are extracted from rows of bits | `board`, `window` |
 //! | a robot is one word, states are compared as words | `robot_word`, `swarm` |
 //! | actions come from a table, filled on demand or all at once | `actions` |
 //! | the world runs first, predictions are computed from its recording | `recording` |
 //! | a world that repeats a state is not run further | `repeats` |
-//! | stretches in which a robot's inputs and predictions repeat are only counted | `skipping` |
+//! | steps in which a robot's inputs and predictions repeat are counted, not computed | `skipping` |
 //! | predictions of 32 robots are computed side by side | `lanes`, `network`, `portable`, `x86` |
 //! | noise is drawn once per generation | `flips` |
 //! | fixed predictions are compared four steps at a time | `fixed_predictions` |

@@ -1,4 +1,4 @@
-//! The prediction network in window order, ready to be laid out for a vector unit.
+//! The prediction network in window order, before its conversion to the layout of a vector unit.
 //!
 //! An input neuron has two values, so the sum of a hidden neuron's inputs is a constant plus one
 //! addend for each bit that is set; sums are exact in any order.
@@ -12,14 +12,14 @@ use minimal_surprise_controller::{Controller, Topology};
 /// The input sum of a hidden neuron as a function of the window, Q24.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct HiddenSum {
-    /// The sum for an empty window, the rounding term included.
+    /// The sum for an empty window, including the rounding term.
     pub(super) empty: i32,
-    /// What each bit of the window adds to it.
+    /// Addend of each window bit that is set.
     pub(super) addends: [i32; WINDOW_BITS],
 }
 
 impl HiddenSum {
-    /// The hidden neurons of a network.
+    /// Returns the input sums of a network's hidden neurons.
     pub(super) fn of<const H: usize, const O: usize>(
         network: &Network<H, O>,
         order: &WindowOrder,
@@ -38,11 +38,11 @@ impl HiddenSum {
         sums
     }
 
-    /// What the n bits starting at `first` add to the sum, for each of their 2ⁿ = `N` values. The
-    /// first table includes the sum of an empty window.
+    /// Tabulates the contribution of the n bits starting at `first` to the sum, for each of their
+    /// 2ⁿ = `N` values. The first table includes the sum of an empty window.
     ///
-    /// The values of one table may exceed `i32`; they and the totals are correct modulo 2³², and
-    /// the sums themselves fit.
+    /// The values of one table may exceed `i32`; the values and the totals are correct modulo 2³²,
+    /// and the final sums fit.
     pub(super) fn table<const N: usize>(&self, first: usize) -> [i32; N] {
         let mut table = [0; N];
         table[0] = if first == 0 { self.empty } else { 0 };
@@ -59,29 +59,29 @@ impl HiddenSum {
     }
 }
 
-/// The window bits that a robot predicts *not* occupied before its first step. In this form, a
-/// predicted bit matches if it differs from the next reading.
+/// Returns the window bits that a robot predicts *not* occupied before its first step. In this
+/// form, a predicted bit matches if it differs from the next reading.
 pub(super) fn expected_empty_at_start(topology: Topology, order: &WindowOrder) -> u16 {
     order.sensors() & !order.window(topology.fixed().bits())
 }
 
-/// The network of one genome.
+/// The prediction network of one genome.
 #[derive(Clone, Debug)]
 pub(super) struct PredictionWeights {
     /// Window bits that are sensors.
     pub(super) sensors: u16,
     /// Window bits predicted not occupied before the first step.
     pub(super) expected_empty_at_start: u16,
-    /// Hidden neurons in use.
+    /// Number of hidden neurons in use.
     pub(super) hidden: usize,
     pub(super) sums: [HiddenSum; MAX_HIDDEN],
     pub(super) self_loops: [i16; MAX_HIDDEN],
-    /// Output rows, with the window bit that each predicts; the highest bit first.
+    /// Output rows with the window bit that each row predicts; the highest bit first.
     pub(super) outputs: Vec<(u32, [i16; MAX_HIDDEN])>,
 }
 
 impl PredictionWeights {
-    /// `None` if all predictions are fixed.
+    /// Converts the prediction network of a controller; `None` if all predictions are fixed.
     pub(super) fn new(controller: &Controller, order: &WindowOrder) -> Option<Self> {
         let network = controller.prediction_network()?;
         let predicted = controller.topology().predicted().bits();

@@ -1,4 +1,4 @@
-//! Code paths: the same results with the instructions of different processors.
+//! Code paths: identical results with the instructions of different processors.
 
 #[cfg(target_arch = "x86_64")]
 use super::x86;
@@ -6,7 +6,7 @@ use super::x86;
 /// Environment variable that forces a path: `portable`, `avx2` or `avx512`.
 pub const PATH_VARIABLE: &str = "MINIMAL_SURPRISE_PATH";
 
-/// The instructions that the fast engine uses. All paths give the same results.
+/// The instruction set that the fast engine uses. All paths give the same results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EnginePath {
     /// Instructions that every processor has.
@@ -15,18 +15,18 @@ pub enum EnginePath {
     #[cfg(target_arch = "x86_64")]
     Avx2(x86::Avx2),
     /// AVX-512 with its additions up to Ice Lake and Zen 4: predictions of 32 robots at once,
-    /// sensing and deciding of 16.
+    /// sensing and deciding of 16 robots at once.
     #[cfg(target_arch = "x86_64")]
     Avx512(x86::Avx512),
 }
 
-/// This processor cannot run the path, or no path has this name.
+/// Error for the name of a path that is unknown or not supported by this processor.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{PATH_VARIABLE} names the path {0:?}; this processor has {list}", list = EnginePath::names())]
 pub struct PathError(String);
 
 impl EnginePath {
-    /// The paths that this processor can run, the best one last.
+    /// Returns the paths that this processor can run, with the fastest path last.
     #[must_use]
     pub fn available() -> Vec<Self> {
         #[allow(unused_mut, reason = "there is nothing to add on other processors")]
@@ -39,16 +39,16 @@ impl EnginePath {
         paths
     }
 
-    /// The fastest path that this processor can run.
+    /// Returns the fastest path that this processor can run.
     #[must_use]
     pub fn best() -> Self {
         Self::available().pop().unwrap_or(Self::Portable)
     }
 
-    /// The path with this name.
+    /// Returns the path with this name.
     ///
     /// # Errors
-    /// [`PathError`] if this processor has no path with this name.
+    /// [`PathError`] if the name is unknown or this processor cannot run the path.
     pub fn named(name: &str) -> Result<Self, PathError> {
         Self::available()
             .into_iter()
@@ -56,10 +56,11 @@ impl EnginePath {
             .ok_or_else(|| PathError(name.to_owned()))
     }
 
-    /// The path that [`PATH_VARIABLE`] names; if it is not set, the best.
+    /// Returns the path named by [`PATH_VARIABLE`]; if the variable is not set, the fastest path.
     ///
     /// # Errors
-    /// [`PathError`] if the variable names a path that this processor does not have.
+    /// [`PathError`] if the variable names a path that is unknown or that this processor cannot
+    /// run.
     pub fn from_environment() -> Result<Self, PathError> {
         match std::env::var(PATH_VARIABLE) {
             Ok(name) if !name.is_empty() => Self::named(&name),
@@ -67,7 +68,7 @@ impl EnginePath {
         }
     }
 
-    /// `portable`, `avx2` or `avx512`.
+    /// Returns `portable`, `avx2` or `avx512`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

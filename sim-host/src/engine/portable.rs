@@ -1,12 +1,12 @@
-//! Predictions without processor-specific vector instructions: lane after lane, with the neurons of
-//! a layer side by side in arrays.
+//! Predictions without processor-specific vector instructions: one lane after the other, with the
+//! neurons of a layer side by side in arrays.
 
 use super::lanes::{BLOCK_STEPS, Blocks, Lanes, Matches};
 use super::network::PredictionWeights;
 use minimal_surprise_controller::activate;
 use minimal_surprise_controller::fixed::sum_to_q3_12;
 
-/// Neurons of a layer, used or not.
+/// Maximum number of neurons of a layer.
 const WIDTH: usize = 16;
 
 /// A prediction network as rows of neurons.
@@ -14,10 +14,10 @@ pub(super) struct Network {
     sensors: u16,
     expected_empty_at_start: u16,
     hidden: usize,
-    /// What each five bits of a window add to every hidden sum, for each of their values.
+    /// Addends of each five bits of a window to every hidden sum, for each of their values.
     inputs: [[[i32; WIDTH]; 32]; 3],
     self_loops: [i32; WIDTH],
-    /// The weights of each output and the window bit it predicts.
+    /// Weights of each output and the window bit that it predicts.
     outputs: Vec<(u32, [i16; WIDTH])>,
 }
 
@@ -48,7 +48,7 @@ impl Network {
         network
     }
 
-    /// See [`super::lanes::Predictor::run_block`].
+    /// Runs one block; see [`super::lanes::Predictor::run_block`].
     pub(super) fn run_block(
         &self,
         lanes: &mut Lanes,
@@ -100,7 +100,7 @@ impl Network {
         }
     }
 
-    /// The window bits that the activations predict not occupied.
+    /// Returns the window bits that the activations predict not occupied.
     #[inline]
     fn expected_empty(&self, hidden: &[i16; WIDTH]) -> u16 {
         let mut expected_empty = 0;

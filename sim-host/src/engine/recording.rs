@@ -30,7 +30,7 @@ impl Recording {
         self.blocks
     }
 
-    /// The blocks of one robot.
+    /// Returns the blocks of one robot.
     #[inline]
     pub(super) fn of_robot(&self, robot: usize) -> &[u64] {
         &self.words[robot * self.blocks..][..self.blocks]
@@ -55,12 +55,12 @@ impl Recording {
         }
     }
 
-    /// All blocks, robot by robot.
+    /// Returns all blocks, robot by robot.
     pub(super) fn words(&self) -> &[u64] {
         &self.words
     }
 
-    /// The blocks of several consecutive robots.
+    /// Returns the blocks of several consecutive robots.
     fn of_robots(&mut self, first: usize, robots: usize) -> &mut [u64] {
         &mut self.words[first * self.blocks..][..robots * self.blocks]
     }
@@ -139,8 +139,8 @@ impl Recorder {
         }
     }
 
-    /// Records one block of all robots; `words[0]` is the first robot's, and the others' follow
-    /// `stride` apart.
+    /// Records one block of all robots; `words[0]` belongs to the first robot, and the words of the
+    /// other robots follow at intervals of `stride`.
     fn record_block(
         &mut self,
         swarm: &mut Swarm,

@@ -1,9 +1,9 @@
 //! Repeated states: the world is deterministic, so once all robot words equal those of an earlier
-//! time, everything repeats from then on.
+//! time, all later states repeat too.
 //!
 //! States are looked up by hash and then compared in full.
 
-/// The states that a swarm has been in.
+/// All states of a swarm so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct History {
     hashes: Vec<u32>,
@@ -16,7 +16,7 @@ impl History {
         self.states.clear();
     }
 
-    /// Returns the index of an equal earlier state; if there is none, adds the state.
+    /// Returns the index of an equal earlier state; if none is found, adds the state.
     pub(super) fn find_or_add(&mut self, state: &[u32]) -> Option<usize> {
         let hash = hash(state);
         for (place, _) in self
@@ -36,7 +36,8 @@ impl History {
     }
 }
 
-/// A sum in which every robot has its own odd factor, so that it can be computed in any order.
+/// Computes the hash of a state: a sum that can be computed in any order, in which every robot has
+/// a different odd factor.
 fn hash(state: &[u32]) -> u32 {
     let mut factor = 0x9e37_79b9_u32;
     let mut sum = 0_u32;

@@ -1,4 +1,4 @@
-//! A robot as one word: everything about it that affects the world.
+//! A robot as one word: all of its properties that affect the world.
 //!
 //! ```text
 //! bits 0–13   x
@@ -15,16 +15,16 @@ use crate::torus::{Heading, Pose};
 
 const COORDINATE_BITS: u32 = 14;
 const COORDINATE: u32 = (1 << COORDINATE_BITS) - 1;
-/// Both coordinates.
+/// Bits of both coordinates.
 pub(super) const POSITION: u32 = (1 << (2 * COORDINATE_BITS)) - 1;
-/// Lowest bit of the heading: set where the robot faces north or south.
+/// Lowest bit of the heading: set if the robot faces north or south.
 pub(super) const HEADING_SHIFT: u32 = 29;
-/// The last action.
+/// Bit of the last action.
 pub(super) const ACTION: u32 = 1 << 31;
 
 const _: () = assert!(crate::torus::SIDE_MAX == 1 << COORDINATE_BITS);
 
-/// A robot before its first step.
+/// Returns the word of a robot before its first step.
 pub(super) fn from_pose(pose: Pose) -> u32 {
     position(pose.x.into(), pose.y.into()) | (pose.heading as u32) << HEADING_SHIFT
 }
@@ -38,7 +38,7 @@ pub(super) fn pose(word: u32) -> Pose {
     }
 }
 
-/// Coordinates at their bit positions.
+/// Returns coordinates shifted to their bit positions.
 pub(super) fn position(x: u32, y: u32) -> u32 {
     x | y << COORDINATE_BITS
 }
@@ -51,7 +51,7 @@ pub(super) fn y(word: u32) -> u32 {
     word >> COORDINATE_BITS & COORDINATE
 }
 
-/// Number of the heading.
+/// Returns the number of the heading.
 pub(super) fn heading(word: u32) -> u32 {
     word >> HEADING_SHIFT & 3
 }

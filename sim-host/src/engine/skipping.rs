@@ -1,9 +1,9 @@
-//! Predictions without noise: stretches in which nothing changes are counted, not computed.
+//! Predictions without noise: blocks in which nothing changes are counted, not computed.
 //!
-//! If the same block of inputs repeats, a robot's hidden activations soon are the same before and
-//! after a block. From then on, until its inputs change, every block has as many matching bits as
-//! the last one. Each lane has its own position in the recording of its own robot, skips
-//! independently, and takes the next robot at the end.
+//! If the same block of inputs repeats, the hidden activations of a robot soon become the same
+//! before and after a block. As long as the inputs do not change after that, every block has as
+//! many matching bits as the last one. Each lane has its own position in the recording of its
+//! robot, skips independently, and takes the next robot when its recording is complete.
 
 use super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, Predictor};
 use super::recording::Recording;
@@ -111,12 +111,12 @@ struct Place {
     robot: usize,
     /// Index of the next block among all recorded blocks.
     word: usize,
-    /// End of the robot's whole blocks.
+    /// End of the robot's complete blocks.
     end: usize,
     matched: u64,
 }
 
-/// Indices of the bits that are set.
+/// Iterates over the indices of the bits that are set.
 fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let lowest = (bits != 0).then(|| bits.trailing_zeros() as usize);
@@ -125,7 +125,7 @@ fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Returns how many leading blocks equal `block`.
+/// Counts the leading blocks that equal `block`.
 fn alike_at_start(blocks: &[u64], block: u64) -> usize {
     let (chunks, _) = blocks.as_chunks::<8>();
     let all_alike = |chunk: &&[u64; 8]| chunk.iter().fold(0, |d, &b| d | (b ^ block)) == 0;

@@ -1,7 +1,7 @@
 //! The world of one repetition: robots as words, the board as bits.
 //!
-//! The prediction network never affects the world, so a swarm runs with action tables alone and
-//! records each robot's inputs; predictions are computed from them afterwards.
+//! The prediction network never affects the world, so a swarm runs with only action tables and
+//! records each robot's inputs; predictions are computed from the recorded inputs.
 
 use super::actions::ActionTable;
 use super::board::Board;
@@ -16,7 +16,7 @@ use minimal_surprise_controller::Controller;
 /// Robot words are padded to a multiple of this number.
 pub(super) const ROBOTS_AT_ONCE: usize = 16;
 
-/// What all swarms of an evaluation share: the genome's behaviour.
+/// The behaviour of a genome, shared by all swarms of an evaluation.
 pub(super) struct Behaviour<'a> {
     pub(super) controller: &'a Controller,
     pub(super) order: &'a WindowOrder,
@@ -29,7 +29,7 @@ pub(super) struct Swarm {
     robots: usize,
     words: Vec<u32>,
     board: Board,
-    /// Robots that go straight with nothing ahead of them, in index order.
+    /// Robots that go straight and have an empty cell ahead, in index order.
     movers: Vec<u32>,
 }
 
@@ -50,7 +50,7 @@ impl Swarm {
         self.movers.resize(padded + ROBOTS_AT_ONCE, 0);
     }
 
-    /// Everything that the swarm's future depends on, except noise.
+    /// Returns everything that determines the swarm's future, except noise.
     pub(super) fn state(&self) -> &[u32] {
         &self.words[..self.robots]
     }
@@ -89,7 +89,7 @@ impl Swarm {
         self.board.advance(&self.movers[..movers], &mut self.words);
     }
 
-    /// Turns the robots that turn and lists those that may move; returns the number of the latter.
+    /// Applies all turns and lists the robots that may move; returns the length of the list.
     fn sense_and_decide(
         &mut self,
         behaviour: &mut Behaviour<'_>,

@@ -1,28 +1,28 @@
 //! The window: the three by five cells around a robot as one word, its rows along the heading.
 //!
-//! A robot senses by cutting its window out of rows of bits, so the engine uses window order
-//! throughout: action table, prediction network and score are rearranged once, and no reading is
-//! ever converted to sensor order. Bit `5·(left + 1) + ahead + 2` is the cell (ahead, left). The
+//! A robot senses by extracting its window from rows of bits, so the engine uses window order
+//! throughout: action table, prediction network and score are converted once, and readings never
+//! need conversion to sensor order. Bit `5·(left + 1) + ahead + 2` is the cell (ahead, left). The
 //! bit of a robot's own cell, which is always occupied, holds the action value instead, so that a
 //! window is the whole input of a network.
 
 use minimal_surprise_controller::sensor::{Cell, MAX_SENSORS, SensorModel};
 use minimal_surprise_controller::{Action, SensorBits};
 
-/// Cells of the window, bits of a network's input.
+/// Number of cells of the window and of bits of a network's input.
 pub(super) const WINDOW_BITS: usize = 15;
-/// All sensors and the action value have a place.
+/// All sensors and the action value fit the window.
 const _: () = assert!(MAX_SENSORS < WINDOW_BITS);
 /// Number of different windows.
 pub(super) const WINDOWS: usize = 1 << WINDOW_BITS;
-/// Cells of one row.
+/// Number of cells of one row.
 pub(super) const ROW_BITS: usize = 5;
 /// The bit of the robot's own cell, used for the action value.
 pub(super) const ACTION_BIT: u16 = 1 << 7;
 /// The cell straight ahead.
 pub(super) const AHEAD_BIT: u16 = 1 << 8;
 
-/// Where the sensors of a model are in the window.
+/// Positions of a model's sensors in the window.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct WindowOrder {
     model: SensorModel,
@@ -30,7 +30,7 @@ pub(super) struct WindowOrder {
     from_sensors: [[u16; 256]; 2],
 }
 
-/// The window bit of a cell.
+/// Returns the window bit of a cell.
 pub(super) fn bit_of(cell: Cell) -> usize {
     (ROW_BITS as i32 * (i32::from(cell.left) + 1) + i32::from(cell.ahead) + 2) as usize
 }
@@ -53,24 +53,24 @@ impl WindowOrder {
         self.model
     }
 
-    /// A reading in window order, with the action bit zero.
+    /// Converts a reading to window order, with the action bit zero.
     pub(super) fn window(&self, reading: u16) -> u16 {
         let [low, high] = &self.from_sensors;
         low[usize::from(reading & 0xff)] | high[usize::from(reading >> 8)]
     }
 
-    /// A mask with one bit set for every sensor.
+    /// Returns a mask with one bit set for every sensor.
     pub(super) fn sensors(&self) -> u16 {
         self.window(self.model.mask().bits())
     }
 
-    /// The window bits of sensor 0, 1, … and, last, of the action value: the inputs of a network.
+    /// Returns the window bits of a network's inputs: sensor 0, 1, … and, last, the action value.
     pub(super) fn inputs(&self) -> impl Iterator<Item = usize> + use<> {
         let cells = self.model.cells().iter().copied().map(bit_of);
         cells.chain([ACTION_BIT.trailing_zeros() as usize])
     }
 
-    /// Reading and action of a window.
+    /// Returns the reading and the action of a window.
     pub(super) fn reading(&self, window: u16) -> (SensorBits, Action) {
         let mut bits = 0;
         for (sensor, &cell) in self.model.cells().iter().enumerate() {

@@ -1,4 +1,4 @@
-//! `agents`: where the best genome of each generation started and ended.
+//! `agents`: initial and final poses of the best genome of each generation.
 //!
 //! ```text
 //! Gen: <generation>
@@ -8,7 +8,7 @@
 //! ⋮                                            one line per robot, then a blank line
 //! ```
 //!
-//! The type of a robot is ignored.
+//! This module ignores the type of a robot.
 
 use super::{ExchangeError, Lines, Problem, grid_header, header, no_overlap, numbers, pose};
 use crate::torus::{Grid, Pose};
@@ -16,11 +16,11 @@ use crate::torus::{Grid, Pose};
 /// The run that determined the fitness of the best genome of a generation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AgentsOfGeneration {
-    /// The generation.
+    /// Index of the generation.
     pub generation: u32,
     /// The grid.
     pub grid: Grid,
-    /// Its fitness, 0 to 1, as written: six decimals.
+    /// Fitness of the genome, 0 to 1, as written: six decimals.
     pub fitness: f64,
     /// Poses before the first step.
     pub starts: Vec<Pose>,
@@ -31,10 +31,10 @@ pub struct AgentsOfGeneration {
 const ROBOT: &str = "<x>, <y>, <start x>, <start y>, <heading x>, <heading y>, \
     <start heading x>, <start heading y>, <type>";
 
-/// Reads the text of an `agents` file: its generations, in order, at least one.
+/// Parses the text of an `agents` file: one or more generations, in order.
 ///
 /// # Errors
-/// [`ExchangeError`] names the first line that is wrong.
+/// [`ExchangeError`] for the first invalid line.
 pub fn read_agents(text: &str) -> Result<Vec<AgentsOfGeneration>, ExchangeError> {
     let mut lines = Lines::of(text);
     let mut generations: Vec<AgentsOfGeneration> = Vec::new();

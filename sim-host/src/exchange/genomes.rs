@@ -1,10 +1,10 @@
 //! `action_genomes` and `prediction_genomes`: weights of the best genome of each generation.
 //!
-//! Three rows of decimal numbers per generation, for the input, hidden and output neurons of one
-//! network in genome order (see [`minimal_surprise_controller::network`]), then a blank line. All
-//! rows are padded with random numbers to the length of the longest row of the model's prediction
-//! network, that of its hidden weights: 80 for sensor model A, 48 for B, 224 for C, and 192 for C
-//! with the line partly predefined.
+//! Each generation has three rows of decimal numbers, for the input, hidden and output neurons of
+//! one network in genome order (see [`minimal_surprise_controller::network`]), then a blank line.
+//! All rows are padded with random numbers to the length of the longest row of the model's
+//! prediction network, the row of its hidden weights: 80 for sensor model A, 48 for B, 224 for C,
+//! and 192 for C with the line partly predefined.
 
 use super::{ExchangeError, Lines, Problem, number};
 use minimal_surprise_controller::fixed::{FRACTION_BITS, WEIGHT_MAX_Q3_12};
@@ -14,7 +14,7 @@ use minimal_surprise_controller::{Genome, Prediction, Topology};
 /// Rows of one generation's network, as in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GenomeRows {
-    /// Line of the first row, from 1; the others follow.
+    /// Number of the first row's line, from 1; the other rows follow it.
     pub line: usize,
     /// The rows of the input, hidden and output neurons, including the padding.
     pub rows: [Vec<f64>; 3],
@@ -22,17 +22,18 @@ pub struct GenomeRows {
 
 const ROWS: [&str; 3] = ["input row", "hidden row", "output row"];
 
-/// Reads the text of an `action_genomes` or a `prediction_genomes` file: the networks of its
-/// generations, from generation 0, at least one.
+/// Parses the text of an `action_genomes` or a `prediction_genomes` file: the networks of one or
+/// more generations, starting with generation 0.
 ///
 /// # Errors
-/// [`ExchangeError`] names the first line that is wrong.
+/// [`ExchangeError`] for the first invalid line.
 pub fn read_genomes(text: &str) -> Result<Vec<GenomeRows>, ExchangeError> {
     generations(text).map(|rows| rows?.numbers()).collect()
 }
 
-/// The generations of an `action_genomes` or a `prediction_genomes` file, at least one: their rows
-/// as text, so that only the numbers that are used must be valid. The iterator ends after an error.
+/// Iterates over the generations of an `action_genomes` or a `prediction_genomes` file, at least
+/// one. Returns their rows as text, so that only the numbers that are used must be valid. The
+/// iterator ends after an error.
 pub fn generations(text: &str) -> impl Iterator<Item = Result<RowsOfText<'_>, ExchangeError>> {
     let (mut lines, mut generation, mut ended) = (Lines::of(text), 0, false);
     core::iter::from_fn(move || {
@@ -81,7 +82,7 @@ impl RowsOfText<'_> {
     /// Parses the numbers in the rows.
     ///
     /// # Errors
-    /// [`ExchangeError`] names the first line that is wrong.
+    /// [`ExchangeError`] for the first invalid line.
     pub fn numbers(&self) -> Result<GenomeRows, ExchangeError> {
         let mut rows = [const { Vec::new() }; 3];
         for ((line, text), row) in (self.line..).zip(self.rows).zip(&mut rows) {
@@ -99,7 +100,7 @@ impl RowsOfText<'_> {
     }
 }
 
-/// Which of a genome's two networks.
+/// Name of one of a genome's two networks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum NetworkName {
     /// The action network.
@@ -120,13 +121,13 @@ impl core::fmt::Display for NetworkName {
 /// A weight beyond ±32767/4096 ≈ ±7.9998, which was limited to that range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SaturatedWeight {
-    /// The network whose file it is in.
+    /// The network whose file contains the weight.
     pub network: NetworkName,
-    /// Its line, from 1.
+    /// Number of the weight's line, from 1.
     pub line: usize,
-    /// Its position in the line, from 1.
+    /// Position of the weight in the line, from 1.
     pub column: usize,
-    /// Its index in the genome.
+    /// Index of the weight in the genome.
     pub index: usize,
     /// The value in the file.
     pub value: f64,
@@ -134,7 +135,7 @@ pub struct SaturatedWeight {
     pub weight_q3_12: i16,
 }
 
-/// A genome from text, and what was lost in the conversion.
+/// A genome imported from text, with the losses of the conversion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportedGenome {
     /// The genome; each weight is the nearest Q3.12 value, ties away from zero.
@@ -145,7 +146,7 @@ pub struct ImportedGenome {
     pub saturated: Vec<SaturatedWeight>,
 }
 
-/// The rows do not form a genome of the topology.
+/// Reason why the rows do not form a genome of the topology.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
@@ -155,17 +156,17 @@ pub enum ImportError {
         listed(expected)
     )]
     RowLength {
-        /// The network whose file it is in.
+        /// The network whose file contains the row.
         network: NetworkName,
-        /// Its line, from 1.
+        /// Number of the row's line, from 1.
         line: usize,
-        /// Its numbers.
+        /// Number of numbers in the row.
         found: usize,
-        /// Lengths that it may have.
+        /// Valid lengths of the row.
         expected: Vec<usize>,
     },
-    /// The topology has a prediction network, but there are no rows for it.
-    #[error("this topology has a prediction network: its genomes are needed too")]
+    /// The topology has a prediction network, but its rows are missing.
+    #[error("this topology has a prediction network; its genomes are needed too")]
     NoPrediction,
 }
 
@@ -174,8 +175,8 @@ fn listed(lengths: &[usize]) -> String {
     lengths.join(" or ")
 }
 
-/// Makes a genome from the rows of one generation. If all predictions are predefined there is no
-/// prediction network, and its rows are ignored.
+/// Creates a genome from the rows of one generation. If all predictions are predefined, the genome
+/// has no prediction network, and rows for it are ignored.
 ///
 /// # Errors
 /// [`ImportError`] if the length of a row does not match the topology, or the rows of the
@@ -236,8 +237,8 @@ pub fn import_genome(
     })
 }
 
-/// Lengths that rows may have: the number of hidden weights of the topology's prediction network,
-/// or, if it has none, of any prediction network of its sensor model.
+/// Returns the valid lengths of rows: the number of hidden weights of the topology's prediction
+/// network or, if it has none, of any prediction network of its sensor model.
 fn row_lengths(topology: Topology) -> Vec<usize> {
     let hidden = |shape: Shape| shape.hidden() * shape.hidden_row();
     let same = |other: &Topology| match topology.prediction() {
@@ -251,7 +252,7 @@ fn row_lengths(topology: Topology) -> Vec<usize> {
         .collect()
 }
 
-/// The nearest weight, and whether the value is within half a unit of it.
+/// Returns the nearest weight, and true if the value is within half a unit of that weight.
 fn to_q3_12(value: f64) -> (i16, bool) {
     let limit = f64::from(WEIGHT_MAX_Q3_12);
     let scaled = (value * f64::from(1 << FRACTION_BITS)).round();
@@ -267,7 +268,7 @@ mod tests {
     use super::*;
     use minimal_surprise_controller::{SensorModel, Template};
 
-    /// A generation whose rows count up in units of 1/4096, padded to a length.
+    /// Returns a generation whose rows count up in units of 1/4096, padded to a length.
     fn text(length: usize) -> String {
         let row = |start: usize| -> String {
             let row = start..start + length;
@@ -285,7 +286,7 @@ mod tests {
         let rows = read_genomes(&text(48)).unwrap().remove(0);
         let free = topology(SensorModel::B, Prediction::Free);
         let imported = import_genome(free, &rows, Some(&rows)).unwrap();
-        // B: 7–4–2 has 14, 28 and 8 weights, 7–6–6 has 14, 48 and 36.
+        // For B, 7–4–2 has 14, 28 and 8 weights; 7–6–6 has 14, 48 and 36.
         let counted = |ranges: [core::ops::Range<i16>; 3]| -> Vec<i16> {
             ranges.into_iter().flatten().collect()
         };
@@ -343,7 +344,7 @@ mod tests {
     #[test]
     fn the_largest_rounding_and_every_weight_that_does_not_fit_are_reported() {
         let mut rows = read_genomes(&text(48)).unwrap().remove(0);
-        rows.rows[0][3] = 0.1; // 409.6 units: 410, 0.4/4096 off.
+        rows.rows[0][3] = 0.1; // 409.6 units, rounded to 410: an error of 0.4/4096.
         rows.rows[1][5] = -8.0;
         rows.rows[2][7] = 7.9998; // 32767.18 units.
         rows.rows[2][40] = 100.0; // Padding.

@@ -1,5 +1,5 @@
-//! The text files of the program published by the paper's authors. Their data can be read here, and
-//! their analysis scripts can read ours.
+//! The text files of the program published by the paper's authors. This crate can read their data,
+//! and their analysis scripts can read the files written by this crate.
 //!
 //! | file | module |
 //! |---|---|
@@ -9,7 +9,7 @@
 //!
 //! Numbers are separated by commas and spaces. A heading is given as the step ahead: `1, 0` is
 //! east, `0, 1` north, `-1, 0` west, `0, -1` south. Blank lines at the end and spaces around lines
-//! are allowed; any other deviation is refused with its line number.
+//! are allowed; any other deviation is rejected with its line number.
 
 pub mod agents;
 pub mod genomes;
@@ -26,13 +26,13 @@ use crate::torus::{Grid, GridError, Heading, Pose};
 use crate::world::{WorldError, check_poses};
 use core::str::FromStr;
 
-/// An error in a text, and its line.
+/// An error in a text, with its line number.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("line {line}: {problem}")]
 pub struct ExchangeError {
-    /// The line, from 1.
+    /// Number of the line, from 1.
     pub line: usize,
-    /// What is wrong with it.
+    /// The problem in the line.
     pub problem: Problem,
 }
 
@@ -49,12 +49,12 @@ pub enum Problem {
         found: String,
     },
     /// The text ends too early.
-    #[error("the text ends where {missing} should follow")]
+    #[error("the text ends before {missing}")]
     Ended {
-        /// What should follow.
+        /// The missing part of the text.
         missing: String,
     },
-    /// Something is not a number.
+    /// A field is not a number.
     #[error("{found:?} is not a finite number")]
     NotANumber {
         /// The text found.
@@ -63,7 +63,7 @@ pub enum Problem {
     /// The grid is not valid.
     #[error(transparent)]
     Grid(#[from] GridError),
-    /// There is no robot, or there are more robots than cells.
+    /// The number of robots is 0 or exceeds the number of cells.
     #[error("{robots} robots on a {grid} grid; from 1 to {} fit", grid.cells())]
     RobotsDoNotFit {
         /// Number of robots.
@@ -72,15 +72,15 @@ pub enum Problem {
         grid: Grid,
     },
     /// The number of robots changes from one generation to the next.
-    #[error("{found} robots, but {expected} in the generations before")]
+    #[error("{found} robots, but {expected} in the earlier generations")]
     OtherSwarmSize {
-        /// Robots of the generation that ends here.
+        /// Number of robots of the generation that ends here.
         found: usize,
-        /// Robots of the generations before.
+        /// Number of robots of the earlier generations.
         expected: usize,
     },
     /// The line belongs to a different time step.
-    #[error("a robot of t = {found} where t = {expected} is expected")]
+    #[error("a robot of t = {found}; expected t = {expected}")]
     OtherStep {
         /// The time step expected.
         expected: u64,
@@ -90,29 +90,29 @@ pub enum Problem {
     /// A robot is outside the grid.
     #[error("a robot at ({x}, {y}), outside the {grid} grid")]
     OutsideGrid {
-        /// Its x.
+        /// The x coordinate of the robot.
         x: i64,
-        /// Its y.
+        /// The y coordinate of the robot.
         y: i64,
         /// The grid.
         grid: Grid,
     },
     /// Two robots share a cell.
-    #[error("a robot at ({x}, {y}), where that of line {other} is already")]
+    #[error("a robot at ({x}, {y}), which the robot of line {other} already occupies")]
     Overlap {
-        /// Their x.
+        /// The x coordinate of both robots.
         x: u16,
-        /// Their y.
+        /// The y coordinate of both robots.
         y: u16,
-        /// Line of the robot that was there first.
+        /// Line number of the robot that occupies the cell already.
         other: usize,
     },
-    /// Not one of the four headings.
+    /// The heading is not one of the four directions.
     #[error("heading ({x}, {y}); headings are (1, 0), (0, 1), (-1, 0) and (0, -1)")]
     UnknownHeading {
-        /// Its x.
+        /// The x component of the heading.
         x: i64,
-        /// Its y.
+        /// The y component of the heading.
         y: i64,
     },
 }
@@ -140,14 +140,14 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// The next line and its number.
+    /// Returns the next line and its number.
     fn next(&mut self) -> Option<(usize, &'a str)> {
         let (index, text) = self.lines.next()?;
         self.next = index + 2;
         Some((index + 1, text.trim()))
     }
 
-    /// The next line, which must exist.
+    /// Returns the next line, which must exist.
     fn required(
         &mut self,
         missing: impl FnOnce() -> String,
@@ -157,7 +157,7 @@ impl<'a> Lines<'a> {
             .ok_or_else(|| Problem::Ended { missing: missing() }.at(line))
     }
 
-    /// Returns whether a line with text follows.
+    /// Returns true if a line with text follows.
     fn text_follows(&mut self) -> bool {
         self.lines
             .peek()
@@ -171,7 +171,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// The numbers of a line of the form `<name>: <number>, …`.
+/// Parses the numbers of a line of the form `<name>: <number>, …`.
 fn header<T: FromStr, const N: usize>(
     lines: &mut Lines,
     name: &str,
@@ -186,13 +186,13 @@ fn header<T: FromStr, const N: usize>(
     Ok((line, numbers))
 }
 
-/// The grid of a line `Grid: <Lx>, <Ly>`.
+/// Parses the grid of a line `Grid: <Lx>, <Ly>`.
 fn grid_header(lines: &mut Lines) -> Result<Grid, ExchangeError> {
     let (line, [width, height]) = header(lines, "Grid", "Grid: <Lx>, <Ly>")?;
     Grid::new(width, height).map_err(|error| Problem::from(error).at(line))
 }
 
-/// Exactly N numbers, separated by commas.
+/// Parses exactly N numbers, separated by commas.
 fn numbers<T: FromStr, const N: usize>(
     line: usize,
     text: &str,
@@ -226,12 +226,12 @@ fn unexpected(expected: &'static str, found: &str) -> Problem {
     }
 }
 
-/// The start of a text, for a one-line message.
+/// Returns the start of a text, for a one-line message.
 fn shortened(text: &str) -> String {
     text.chars().take(40).collect()
 }
 
-/// A pose from its numbers.
+/// Creates a pose from its numbers.
 fn pose(line: usize, grid: Grid, at: (i64, i64), ahead: (i64, i64)) -> Result<Pose, ExchangeError> {
     let (x, y) = at;
     let on_side = |at: i64, side: u16| (0..i64::from(side)).contains(&at);
@@ -256,7 +256,8 @@ fn pose(line: usize, grid: Grid, at: (i64, i64), ahead: (i64, i64)) -> Result<Po
     })
 }
 
-/// Checks that no two robots share a cell; the first stands on line `first`, the others below it.
+/// Checks that no two robots share a cell. Robot 0 is on line `first`, the others on the next
+/// lines.
 fn no_overlap(grid: Grid, poses: &[Pose], first: usize) -> Result<(), ExchangeError> {
     check_poses(grid, poses).map_err(|error| match error {
         WorldError::Overlap { robot, other, x, y } => Problem::Overlap {

@@ -7,8 +7,8 @@
 //! <t>: <x>, <y>, <heading x>, <heading y>      N lines per step, t = 0, 1, …
 //! ```
 //!
-//! The file does not contain the number of steps, so a text that ends between two steps looks like
-//! a shorter run.
+//! The file does not contain the number of steps, so a text truncated between two steps cannot be
+//! distinguished from a shorter run.
 
 use super::{ExchangeError, Lines, Problem, grid_header, header, no_overlap, numbers, pose};
 use crate::torus::{Grid, Pose};
@@ -26,7 +26,7 @@ pub struct Trajectory {
 const ROBOT: &str = "<t>: <x>, <y>, <heading x>, <heading y>";
 
 impl Trajectory {
-    /// The poses of a trace.
+    /// Takes the poses from a trace.
     #[must_use]
     pub fn of_trace(generation: u32, grid: Grid, trace: &Trace) -> Self {
         let before = trace.steps.iter().map(|step| step.poses.clone());
@@ -37,40 +37,40 @@ impl Trajectory {
         }
     }
 
-    /// The generation given in the file.
+    /// Returns the generation given in the file.
     #[must_use]
     pub fn generation(&self) -> u32 {
         self.generation
     }
 
-    /// The grid.
+    /// Returns the grid.
     #[must_use]
     pub fn grid(&self) -> Grid {
         self.grid
     }
 
-    /// The swarm at t = 0, 1, …; at least one state.
+    /// Returns the swarm at t = 0, 1, …; at least one state.
     #[must_use]
     pub fn states(&self) -> &[Vec<Pose>] {
         &self.states
     }
 
-    /// The swarm at the end.
+    /// Returns the final state of the swarm.
     #[must_use]
     pub fn final_poses(&self) -> &[Pose] {
         self.states.last().map_or(&[], Vec::as_slice)
     }
 
-    /// Number of steps: one less than the number of states.
+    /// Returns the number of steps: one less than the number of states.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.states.len().saturating_sub(1) as u32
     }
 
-    /// Reads the text of an `agent_trajectory`.
+    /// Parses the text of an `agent_trajectory` file.
     ///
     /// # Errors
-    /// [`ExchangeError`] names the first line that is wrong.
+    /// [`ExchangeError`] for the first invalid line.
     pub fn read(text: &str) -> Result<Self, ExchangeError> {
         let mut lines = Lines::of(text);
         let (_, [generation]) = header(&mut lines, "Gen", "Gen: <generation>")?;
@@ -93,10 +93,10 @@ impl Trajectory {
         }
     }
 
-    /// Writes the text of an `agent_trajectory`.
+    /// Writes the text of an `agent_trajectory` file.
     ///
     /// # Errors
-    /// Any error of the writer.
+    /// [`io::Error`] if writing fails.
     pub fn write(&self, out: &mut impl io::Write) -> io::Result<()> {
         writeln!(out, "Gen: {}", self.generation)?;
         writeln!(out, "Grid: {}, {}", self.grid.width(), self.grid.height())?;
@@ -111,7 +111,7 @@ impl Trajectory {
     }
 }
 
-/// The robots of one time step.
+/// Reads the robots of one time step.
 fn read_state(
     lines: &mut Lines,
     grid: Grid,

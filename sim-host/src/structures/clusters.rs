@@ -1,16 +1,16 @@
 //! Clusters: robots packed so closely that they block each other.
 //!
 //! A core is a robot with at least [`MOORE_MIN`] robots in its Moore neighbourhood, at least
-//! [`VON_NEUMANN_MIN`] of them orthogonally next to it. A cluster is a Moore-connected set of cores
-//! with all their neighbours. Two clusters are connected if a robot of one is orthogonally next to
-//! a robot of the other, or belongs to both; clusters connected to a third are connected (paper,
-//! Sec. 2.2).
+//! [`VON_NEUMANN_MIN`] of them orthogonally adjacent. A cluster is a Moore-connected set of cores
+//! with all their neighbours. Two clusters are connected if a robot of one is orthogonally adjacent
+//! to a robot of the other, or belongs to both; clusters connected to the same third cluster are
+//! connected too (paper, Sec. 2.2).
 
 use super::field::{Field, MOORE, VON_NEUMANN};
 
-/// Fewest neighbours of a core.
+/// Minimum number of neighbours of a core.
 pub const MOORE_MIN: usize = 6;
-/// Fewest orthogonal neighbours of a core.
+/// Minimum number of orthogonal neighbours of a core.
 pub const VON_NEUMANN_MIN: usize = 3;
 
 /// The grouping behaviour that a swarm's clusters form.
@@ -33,26 +33,27 @@ pub struct Clusters {
 }
 
 impl Clusters {
-    /// The robots of each cluster, ascending. A robot may be in several.
+    /// Returns the robots of each cluster, ascending. A robot may be in several clusters.
     #[must_use]
     pub fn clusters(&self) -> &[Vec<u32>] {
         &self.clusters
     }
 
-    /// For each cluster, the number of its group, which is the index of the group's first cluster.
+    /// Returns the group number of each cluster, which is the index of the group's first cluster.
     /// Connected clusters are in the same group.
     #[must_use]
     pub fn groups(&self) -> &[u32] {
         &self.groups
     }
 
-    /// The robots in any cluster, ascending.
+    /// Returns the robots that belong to at least one cluster, ascending.
     #[must_use]
     pub fn robots(&self) -> &[u32] {
         &self.robots
     }
 
-    /// Number of pairs of clusters connected directly or through others.
+    /// Returns the number of pairs of clusters that are connected directly or through other
+    /// clusters.
     #[must_use]
     pub fn connections(&self) -> u64 {
         let mut sizes = vec![0_u64; self.clusters.len()];
@@ -64,7 +65,7 @@ impl Clusters {
         connections
     }
 
-    /// The grouping that the clusters form; `None` without clusters.
+    /// Returns the grouping that the clusters form; `None` without clusters.
     #[must_use]
     pub fn grouping(&self) -> Option<Grouping> {
         let first = self.groups.first()?;
@@ -81,12 +82,12 @@ impl Clusters {
 /// Mark of a robot in no cluster.
 const NONE: u32 = u32::MAX;
 
-/// All clusters, ordered by their southernmost, then westernmost, core.
+/// Finds all clusters, ordered by their southernmost, then westernmost, core.
 pub(super) fn find(field: &Field) -> Clusters {
     let core = cores(field);
     let mut clusters: Vec<Vec<u32>> = Vec::new();
     let mut reached = vec![false; field.robots()];
-    // The first and the last cluster that each robot was found in.
+    // The first and the last cluster in which each robot was found.
     let mut first_cluster = vec![NONE; field.robots()];
     let mut last_cluster = vec![NONE; field.robots()];
     let mut groups = Groups::default();
@@ -167,7 +168,7 @@ impl Groups {
         number
     }
 
-    /// The first cluster of a cluster's group.
+    /// Returns the first cluster of a cluster's group.
     fn of(&mut self, mut cluster: u32) -> u32 {
         while self.parent[cluster as usize] != cluster {
             let above = self.parent[cluster as usize];

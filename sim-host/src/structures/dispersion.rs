@@ -1,8 +1,8 @@
-//! Dispersion: squares, triangular lattices, and robots that stand apart by chance.
+//! Dispersion: squares, triangular lattices, and robots that are dispersed at random.
 //!
 //! Headings do not matter. Patterns are matched on the torus: on a grid smaller than a pattern,
 //! several positions of the pattern are the same cell, which must then satisfy all of them. On a
-//! side of three cells no pattern is possible.
+//! side of three cells, no pattern is possible.
 
 use super::field::{Field, MOORE};
 
@@ -37,8 +37,8 @@ const LATTICE_EMPTY: [(i32, i32); 12] = [
     (-2, -1),
 ];
 
-/// Whether each robot is in a square: the corners of a 3 × 3 block are occupied, the other 21 cells
-/// of the 5 × 5 block around it are empty.
+/// Returns whether each robot is in a square: the corners of a 3 × 3 block are occupied, and the
+/// other 21 cells of the 5 × 5 block around it are empty.
 pub(super) fn in_squares(field: &Field) -> Vec<bool> {
     let mut members = vec![false; field.robots()];
     for robot in field.row_by_row() {
@@ -53,7 +53,8 @@ pub(super) fn in_squares(field: &Field) -> Vec<bool> {
     members
 }
 
-/// Returns whether each robot is in a triangular lattice: a centre or one of the eight around it.
+/// Returns whether each robot is in a triangular lattice, as a centre or as one of the eight robots
+/// around a centre.
 pub(super) fn in_triangular_lattices(field: &Field) -> Vec<bool> {
     let mut members = vec![false; field.robots()];
     for robot in field.row_by_row() {

@@ -23,13 +23,13 @@ impl<'a> Field<'a> {
         Ok(Self { grid, poses, cells })
     }
 
-    /// Number of robots.
+    /// Returns the number of robots.
     pub(super) fn robots(&self) -> usize {
         self.poses.len()
     }
 
-    /// All robots, row by row from the south, each from the west: an order that depends only on
-    /// where the robots are, and that visits neighbours close together.
+    /// Iterates over all robots, row by row from the south, each row from the west. This order
+    /// depends only on the positions of the robots and keeps neighbours close together.
     pub(super) fn row_by_row(&self) -> impl Iterator<Item = u32> {
         self.cells.iter().copied().filter(|&robot| robot != EMPTY)
     }
@@ -38,8 +38,8 @@ impl<'a> Field<'a> {
         self.poses[robot as usize].heading
     }
 
-    /// Robot on the cell (dx, dy) from a robot, across the edges; at most three cells away, the
-    /// length of the shortest side.
+    /// Returns the robot on the cell at offset (dx, dy) from a robot, across the edges; at most
+    /// three cells away, the length of the shortest side.
     pub(super) fn near(&self, robot: u32, (dx, dy): (i32, i32)) -> Option<u32> {
         let Pose { x, y, .. } = self.poses[robot as usize];
         let x = wrapped(i32::from(x) + dx, self.grid.width());
@@ -48,7 +48,7 @@ impl<'a> Field<'a> {
         (found != EMPTY).then_some(found)
     }
 
-    /// Returns whether the cell (dx, dy) from a robot is occupied.
+    /// Returns true if the cell at offset (dx, dy) from a robot is occupied.
     pub(super) fn occupied(&self, robot: u32, offset: (i32, i32)) -> bool {
         self.near(robot, offset).is_some()
     }
@@ -67,10 +67,10 @@ fn wrapped(at: i32, side: u16) -> u16 {
     on_torus as u16
 }
 
-/// The four orthogonal neighbours.
+/// Offsets of the four orthogonal neighbours.
 pub(super) const VON_NEUMANN: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 
-/// The eight surrounding cells, the orthogonal ones first.
+/// Offsets of the eight surrounding cells, the orthogonal ones first.
 pub(super) const MOORE: [(i32, i32); 8] = [
     (1, 0),
     (0, 1),

@@ -1,20 +1,20 @@
 //! Lines: robots in a row that hold each other in place.
 //!
-//! Along an axis, take a maximal run of neighbouring robots whose headings lie on that axis, and
-//! drop the robots that point outward from both of its ends. The rest is a line if it has at least
-//! [`LENGTH_MIN`] robots and no two adjacent cells beside it, on the same side, are both occupied.
-//! A run around the whole torus needs no ends (paper, Sec. 2.2, rules 1 to 3).
+//! Along an axis, take a maximal run of neighbouring robots whose headings are on that axis, and
+//! remove the robots that point outward from both ends of the run. The rest is a line if it has at
+//! least [`LENGTH_MIN`] robots and no two adjacent cells beside it, on the same side, are both
+//! occupied. A run around the whole torus needs no ends (paper, Sec. 2.2, rules 1 to 3).
 //!
 //! The paper also requires the number of neighbours on a side to be at most half the length. At
-//! most ⌈n/2⌉ of n cells in a row are non-adjacent, so this always holds.
+//! most ⌈n/2⌉ of n cells in a row are non-adjacent, so this is always the case.
 
 use super::field::Field;
 use crate::torus::Heading;
 
-/// Fewest robots of a line.
+/// Minimum number of robots of a line.
 pub const LENGTH_MIN: usize = 3;
 
-/// Direction that a line runs in.
+/// Direction of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Axis {
     /// From west to east.
@@ -27,7 +27,7 @@ impl Axis {
     /// Every axis, in order.
     pub const ALL: [Self; 2] = [Self::Horizontal, Self::Vertical];
 
-    /// The heading along the axis; the other heading on the axis is its reverse.
+    /// Returns the heading along the axis; the other heading on the axis is its reverse.
     fn forward(self) -> Heading {
         match self {
             Self::Horizontal => Heading::East,
@@ -52,20 +52,20 @@ impl Axis {
 pub struct Line {
     /// Direction of the line.
     pub axis: Axis,
-    /// Its robots, in order along the axis.
+    /// Robots of the line, in order along the axis.
     pub robots: Vec<u32>,
-    /// Whether it runs around the whole torus.
+    /// True if the line runs around the whole torus.
     pub spanning: bool,
 }
 
 /// Numbers of lines by direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineCounts {
-    /// Lines from west to east.
+    /// Number of lines from west to east.
     pub horizontal: u32,
-    /// Lines from south to north.
+    /// Number of lines from south to north.
     pub vertical: u32,
-    /// Lines around the whole torus, of either direction.
+    /// Number of lines around the whole torus, in either direction.
     pub spanning: u32,
 }
 
@@ -76,7 +76,7 @@ pub enum LineOrientation {
     MostlyHorizontal,
     /// More than two thirds of the lines are vertical.
     MostlyVertical,
-    /// Neither.
+    /// Neither direction has more than two thirds of the lines.
     MazeLike,
 }
 
@@ -84,7 +84,7 @@ impl LineOrientation {
     /// Every orientation, in order.
     pub const ALL: [Self; 3] = [Self::MostlyHorizontal, Self::MostlyVertical, Self::MazeLike];
 
-    /// The name used in files and tables.
+    /// Returns the name used in files and tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -94,8 +94,9 @@ impl LineOrientation {
         }
     }
 
-    /// The orientation that a genome forms from many starts: that of more than half of the runs, or
-    /// `None` if there is none (the paper's *diverse*). Runs without lines count as runs.
+    /// Returns the orientation that a genome forms from many starts: the orientation of more than
+    /// half of the runs; otherwise `None` (the paper's *diverse*). Runs without lines count as
+    /// runs.
     #[must_use]
     pub fn of_most(runs: &[Option<Self>]) -> Option<Self> {
         Self::ALL.into_iter().find(|&orientation| {
@@ -118,13 +119,13 @@ impl LineCounts {
         counts
     }
 
-    /// Number of lines of either direction.
+    /// Returns the number of lines in both directions.
     #[must_use]
     pub fn total(self) -> u32 {
         self.horizontal + self.vertical
     }
 
-    /// The direction of most lines; `None` without lines.
+    /// Returns the direction of most lines; `None` without lines.
     #[must_use]
     pub fn orientation(self) -> Option<LineOrientation> {
         if self.total() == 0 {
@@ -139,7 +140,7 @@ impl LineCounts {
     }
 }
 
-/// All lines: the horizontal ones, then the vertical ones.
+/// Finds all lines: first the horizontal lines, then the vertical lines.
 pub(super) fn find(field: &Field) -> Vec<Line> {
     let mut lines = Vec::new();
     let mut seen = vec![false; field.robots()];
@@ -170,7 +171,7 @@ pub(super) fn find(field: &Field) -> Vec<Line> {
                 add(&run, false);
             }
         }
-        // A run without a first robot goes around the torus.
+        // A run in which no robot is first goes around the torus.
         for first in field.row_by_row().filter(on_axis) {
             if !seen[first as usize] {
                 follow(field, axis, first, &mut seen, &mut run);
@@ -181,7 +182,7 @@ pub(super) fn find(field: &Field) -> Vec<Line> {
     lines
 }
 
-/// Fills `run` with the robots on the axis from `first` on, up to a gap or back to `first`.
+/// Fills `run` with the robots on the axis, starting at `first`, up to a gap or back to `first`.
 fn follow(field: &Field, axis: Axis, first: u32, seen: &mut [bool], run: &mut Vec<u32>) {
     run.clear();
     let mut next = Some(first);
@@ -194,7 +195,7 @@ fn follow(field: &Field, axis: Axis, first: u32, seen: &mut [bool], run: &mut Ve
     }
 }
 
-/// The run without the robots that point outward from its ends.
+/// Returns the run without the robots that point outward from its ends.
 fn without_outward<'a>(field: &Field, axis: Axis, run: &'a [u32]) -> &'a [u32] {
     let points = |heading| move |&robot: &u32| field.heading(robot) == heading;
     let first = run.iter().position(points(axis.forward()));
@@ -205,7 +206,7 @@ fn without_outward<'a>(field: &Field, axis: Axis, run: &'a [u32]) -> &'a [u32] {
     }
 }
 
-/// Returns whether no two adjacent cells on the same side of the line are occupied.
+/// Returns true if no two adjacent cells on the same side of the line are occupied.
 fn sides_are_free(field: &Field, axis: Axis, line: &[u32], ring: bool) -> bool {
     let (dx, dy) = axis.forward().ahead();
     [(dy, dx), (-dy, -dx)].into_iter().all(|side| {

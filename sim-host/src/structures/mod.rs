@@ -1,5 +1,5 @@
-//! Structures that a swarm has assembled into (paper, Sec. 2.2), on any torus, for any number of
-//! robots, in time linear in cells and robots.
+//! Structures that a swarm has formed (paper, Sec. 2.2), on any torus, for any number of robots, in
+//! time linear in cells and robots.
 //!
 //! A robot may belong to several structures. A run is named after the structure with the most
 //! robots.
@@ -10,7 +10,7 @@ mod field;
 mod lines;
 mod pairs;
 
-/// The names as text: `line`, `line and pair (tied)`, `nothing`.
+/// Formats the names as text: `line`, `line and pair (tied)`, `nothing`.
 #[must_use]
 pub fn in_words(names: &[Structure]) -> String {
     let words: Vec<&str> = names.iter().map(|structure| structure.name()).collect();
@@ -45,7 +45,7 @@ pub enum Structure {
     Clustering,
     /// Several clusters, all connected.
     LooseGrouping,
-    /// Robots with at most one neighbour that are in no line, pair or square.
+    /// Robots that have at most one neighbour and are not part of a line, pair or square.
     RandomDispersion,
     /// Robots on the corners of 3 × 3 blocks, with all other cells around them empty.
     Square,
@@ -66,7 +66,7 @@ impl Structure {
         Self::TriangularLattice,
     ];
 
-    /// The name used in files and tables.
+    /// Returns the name used in files and tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -86,7 +86,7 @@ impl Structure {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Membership(u8);
 
-// Every structure has a bit, and its place in `Structure::ALL` is the bit's number.
+// Every structure has a bit; its index in `Structure::ALL` is the number of the bit.
 const _: () = {
     assert!(Structure::ALL.len() <= u8::BITS as usize);
     let mut bit = 0;
@@ -97,13 +97,13 @@ const _: () = {
 };
 
 impl Membership {
-    /// Returns whether the robot belongs to a structure.
+    /// Returns true if the robot belongs to a structure.
     #[must_use]
     pub fn contains(self, structure: Structure) -> bool {
         self.0 >> structure as u8 & 1 == 1
     }
 
-    /// Bit `i` for `Structure::ALL[i]`.
+    /// Returns the bits; bit `i` stands for `Structure::ALL[i]`.
     #[must_use]
     pub fn bits(self) -> u8 {
         self.0
@@ -111,8 +111,9 @@ impl Membership {
 }
 
 impl Structure {
-    /// How the similarity to an earlier state is measured: triangular lattices are compared by
-    /// cells, because their robots keep turning, all others by poses (paper, Sec. 3.4).
+    /// Returns the condition used to measure the similarity to an earlier state. Triangular
+    /// lattices are compared by cells, because their robots keep turning, all other structures by
+    /// poses (paper, Sec. 3.4).
     #[must_use]
     pub fn matching(self) -> Match {
         match self {
@@ -138,7 +139,7 @@ impl core::fmt::Display for Structure {
     }
 }
 
-/// A pattern of robots: one of the paper's structures, or your own.
+/// A pattern of robots: one of the paper's structures, or a user-defined one.
 pub trait Pattern {
     /// Returns whether each robot belongs to the pattern, robot 0 first.
     ///
@@ -146,7 +147,7 @@ pub trait Pattern {
     /// [`WorldError`] if a robot is outside the grid or two share a cell.
     fn members(&self, grid: Grid, poses: &[Pose]) -> Result<Vec<bool>, WorldError>;
 
-    /// Share of the robots that belong to the pattern, 0 to 1; 0 without robots.
+    /// Returns the share of the robots that belong to the pattern, 0 to 1; 0 without robots.
     ///
     /// # Errors
     /// [`WorldError`] if a robot is outside the grid or two share a cell.
@@ -235,14 +236,14 @@ pub fn classify(grid: Grid, poses: &[Pose]) -> Result<Structures, WorldError> {
 }
 
 impl Structures {
-    /// Returns whether a robot belongs to a structure; false for an index beyond the swarm.
+    /// Returns true if a robot belongs to a structure; false for an index beyond the swarm.
     #[must_use]
     pub fn contains(&self, structure: Structure, robot: u32) -> bool {
         self.members(structure)
             .is_some_and(|members| members.get(robot as usize) == Some(&true))
     }
 
-    /// The structures that each robot belongs to, robot 0 first.
+    /// Returns the structures that each robot belongs to, robot 0 first.
     #[must_use]
     pub fn memberships(&self) -> Vec<Membership> {
         let mut memberships = vec![Membership::default(); self.swarm_size as usize];
@@ -255,57 +256,59 @@ impl Structures {
         memberships
     }
 
-    /// Indices of the robots that belong to a structure, ascending.
+    /// Iterates over the indices of the robots that belong to a structure, ascending.
     pub fn robots_in(&self, structure: Structure) -> impl Iterator<Item = u32> {
         (0..self.swarm_size).filter(move |&robot| self.contains(structure, robot))
     }
 
-    /// Number of robots that belong to a structure.
+    /// Returns the number of robots that belong to a structure.
     #[must_use]
     pub fn count(&self, structure: Structure) -> u32 {
         let members = self.members(structure).unwrap_or_default();
         members.iter().filter(|&&member| member).count() as u32
     }
 
-    /// Share of the robots present that belong to a structure, 0 to 1; 0 without robots.
+    /// Returns the share of the robots present that belong to a structure, 0 to 1; 0 without
+    /// robots.
     #[must_use]
     pub fn share(&self, structure: Structure) -> f64 {
         f64::from(self.count(structure)) / f64::from(self.swarm_size.max(1))
     }
 
-    /// Number of robots present.
+    /// Returns the number of robots present.
     #[must_use]
     pub fn swarm_size(&self) -> u32 {
         self.swarm_size
     }
 
-    /// The lines: the horizontal ones, then the vertical ones.
+    /// Returns the lines: first the horizontal lines, then the vertical lines.
     #[must_use]
     pub fn lines(&self) -> &[Line] {
         &self.lines
     }
 
-    /// Numbers of lines by direction.
+    /// Returns the numbers of lines by direction.
     #[must_use]
     pub fn line_counts(&self) -> LineCounts {
         LineCounts::of(&self.lines)
     }
 
-    /// The pairs.
+    /// Returns the pairs.
     #[must_use]
     pub fn pairs(&self) -> &[[u32; 2]] {
         &self.pairs
     }
 
-    /// The clusters. Together they are an aggregation, a clustering or a loose grouping, and their
-    /// robots count towards that structure.
+    /// Returns the clusters. Together they are an aggregation, a clustering or a loose grouping,
+    /// and their robots count towards that structure.
     #[must_use]
     pub fn clusters(&self) -> &Clusters {
         &self.clusters
     }
 
-    /// The structures that the run is named after: those with the most robots, usually one. If
-    /// there are k of them, the run counts 1/k for each; none if no robot is in any structure.
+    /// Returns the structures that the run is named after: those with the most robots, usually one.
+    /// If k structures are tied, the run counts 1/k for each; empty if no robot is in any
+    /// structure.
     #[must_use]
     pub fn names(&self) -> Vec<Structure> {
         let counts = Structure::ALL.map(|structure| (structure, self.count(structure)));

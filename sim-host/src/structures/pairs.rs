@@ -1,12 +1,12 @@
-//! Pairs: two robots that face and therefore block each other.
+//! Pairs: two robots that face each other and therefore block each other.
 //!
-//! Neither robot is in a line, and on neither side of the pair are both cells occupied (paper, Sec.
-//! 2.2). A pair may be part of a run that is not a line.
+//! Neither robot is in a line, and on each side of the pair at most one of the two cells is
+//! occupied (paper, Sec. 2.2). A pair may be part of a run that is not a line.
 
 use super::field::Field;
 use crate::torus::Heading;
 
-/// All pairs, each starting with its western or southern robot.
+/// Finds all pairs, each starting with its western or southern robot.
 pub(super) fn find(field: &Field, in_line: &[bool]) -> Vec<[u32; 2]> {
     let free = |robot: u32| !in_line[robot as usize];
     field

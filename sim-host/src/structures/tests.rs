@@ -1,4 +1,4 @@
-//! Drawn swarms. North is at the top; opposite edges are joined.
+//! Tests with drawn swarms. North is at the top; opposite edges are joined.
 
 use super::*;
 use crate::drawing::{EMPTY, draw, parse};
@@ -11,7 +11,7 @@ fn classified(drawing: &str) -> Structures {
     classify(grid, &poses).unwrap()
 }
 
-/// The drawing with only the members of a structure.
+/// Returns the drawing with only the members of a structure.
 fn members(structure: Structure, drawing: &str) -> String {
     let (grid, poses) = parse(drawing).unwrap();
     let structures = classify(grid, &poses).unwrap();
@@ -23,7 +23,7 @@ fn members(structure: Structure, drawing: &str) -> String {
     draw(grid, &members)
 }
 
-/// Rows without the white space around them.
+/// Returns the rows without the white space around them.
 fn rows(drawing: &str) -> String {
     let rows: Vec<&str> = drawing.split_whitespace().collect();
     rows.join("\n")
@@ -775,8 +775,8 @@ fn impossible_poses_are_refused() {
     ));
 }
 
-/// The properties of a swarm that do not depend on its position on the torus, its rotation or its
-/// numbering.
+/// Returns the properties of a swarm that do not depend on its position on the torus, its rotation
+/// or its numbering.
 fn summary(structures: &Structures) -> Vec<u64> {
     let lines = structures.line_counts();
     let clusters = structures.clusters();

@@ -1,4 +1,4 @@
-//! An unchecked index. Must not link, otherwise the linking of the other program proves nothing.
+//! An unchecked index. Must not link; otherwise, linking the other program would prove nothing.
 #![no_std]
 #![no_main]
 

@@ -1,8 +1,9 @@
 //! Turns the wheels and triggers the fault named on QEMU's command line. The test `faults` observes
-//! the wheels' registers from outside. Not for a robot: QEMU's chip has neither clock nor timers,
-//! so it can run no other part of the firmware.
+//! the wheels' registers from outside the emulator. Do not flash this program to a robot. QEMU
+//! emulates neither the clocks nor the timers of the chip, so it cannot run the rest of the
+//! firmware.
 //!
-//! Contains `unsafe` code: a register is an address.
+//! Uses `unsafe` because a register is an address.
 #![no_std]
 #![no_main]
 #![allow(unsafe_code)]
@@ -13,7 +14,7 @@ mod faults;
 use cortex_m_rt::entry;
 use firmware_example::faults::guard_stack;
 use firmware_example::provoke::provoke;
-// Links the chip's interrupts.
+// Links the chip's interrupt table.
 use stm32f4xx_hal as _;
 
 /// The register that sets pins of port C.
@@ -24,7 +25,7 @@ const AHEAD: u32 = 0x03c0;
 #[entry]
 fn main() -> ! {
     guard_stack();
-    // SAFETY: a register of pins that no other code uses.
+    // SAFETY: writes a register of pins that no other code uses.
     unsafe { core::ptr::write_volatile(GPIOC_BSRR, AHEAD) };
     provoke()
 }

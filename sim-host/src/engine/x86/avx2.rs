@@ -1,4 +1,4 @@
-//! AVX2: predictions with 16 robots per register of activations and 8 per register of sums.
+//! AVX2: predictions with 16 robots per register of activations and 8 robots per register of sums.
 
 use super::super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, PAIRS};
 use super::super::network::PredictionWeights;
@@ -6,11 +6,11 @@ use core::arch::x86_64::*;
 use minimal_surprise_controller::activation::{MAGNITUDE_CLAMP, SEGMENT_SCALE, SEGMENTS};
 use minimal_surprise_controller::fixed::FRACTION_BITS;
 
-/// Bits of a window that select from a table: a permutation has eight entries.
+/// Number of window bits that select from a table: a permutation has eight entries.
 const TABLE_BITS: usize = 3;
-/// Tables of a hidden neuron.
+/// Number of tables of a hidden neuron.
 const TABLES: usize = 5;
-/// Robots at once.
+/// Number of robots at once.
 const HALF: usize = 16;
 
 /// A prediction network laid out for [`run_block`].
@@ -20,14 +20,14 @@ pub(in super::super) struct Network {
     inputs: [[[i32; 8]; TABLES]; 2 * PAIRS],
     /// Self-loop of each hidden neuron, in its half of a pair; zero in the other half.
     self_loops: [i32; 2 * PAIRS],
-    /// Weights of each output in pairs, and the window bit it predicts.
+    /// Weights of each output in pairs, and the window bit that the output predicts.
     outputs: Vec<(u32, [i32; PAIRS])>,
     pairs_used: usize,
     sensors: u16,
     expected_empty_at_start: u16,
 }
 
-/// Two weights as one factor of a product of pairs.
+/// Packs two weights into one factor of a product of pairs.
 fn pair(even: i16, odd: i16) -> i32 {
     (u32::from(even as u16) | u32::from(odd as u16) << 16) as i32
 }
@@ -61,7 +61,7 @@ impl Network {
     }
 }
 
-/// See [`super::super::lanes::Predictor::run_block`].
+/// Runs one block; see [`super::super::lanes::Predictor::run_block`].
 #[target_feature(enable = "avx2")]
 pub(super) fn run_block(
     network: &Network,
@@ -119,7 +119,7 @@ fn run_half(
             let bit = _mm256_set1_epi16((1_u16 << bit) as i16);
             expected_empty = _mm256_or_si256(expected_empty, _mm256_and_si256(signs, bit));
         }
-        // Packed signs are in packed order; windows are in the robots' order.
+        // Packed signs are in packed order; windows are in the order of the robots.
         expected_empty = _mm256_permute4x64_epi64::<0b11_01_10_00>(expected_empty);
         if step == 0 {
             let at_start = _mm256_set1_epi16(network.expected_empty_at_start as i16);
@@ -176,17 +176,17 @@ fn hidden_sum(network: &Network, neuron: usize, window: __m256i, hidden: __m256i
     sum
 }
 
-/// All ones in the 16-bit lanes of the lowest bits that are set.
+/// Sets all bits of the 16-bit lanes that are selected by the lowest bits of `bits`.
 #[target_feature(enable = "avx2")]
 #[inline]
 fn mask_of_bits(bits: u32) -> __m256i {
     let mask =
         core::array::from_fn::<u16, HALF, _>(|lane| 0_u16.wrapping_sub((bits >> lane) as u16 & 1));
-    // SAFETY: 16 words of 16 bits are a register.
+    // SAFETY: 16 16-bit words fill a register.
     unsafe { _mm256_loadu_si256(mask.as_ptr().cast()) }
 }
 
-/// Number of ones in every 16-bit lane.
+/// Counts the ones in every 16-bit lane.
 #[target_feature(enable = "avx2")]
 #[inline]
 fn ones(x: __m256i) -> __m256i {
@@ -201,7 +201,7 @@ fn ones(x: __m256i) -> __m256i {
     _mm256_maddubs_epi16(bytes, _mm256_set1_epi8(1))
 }
 
-/// Coefficients by segment, twice, because a byte shuffle selects within 128 bits.
+/// Coefficients by segment, stored twice because a byte shuffle selects within 128 bits.
 #[repr(align(64))]
 struct Coefficients([[i16; 16]; 4]);
 
@@ -246,7 +246,7 @@ impl Activation {
         }
     }
 
-    /// `activate` of every 16-bit lane.
+    /// Computes `activate` of every 16-bit lane.
     #[target_feature(enable = "avx2")]
     #[inline]
     fn activate(self, x: __m256i) -> __m256i {
@@ -268,14 +268,14 @@ impl Activation {
 #[target_feature(enable = "avx2")]
 #[inline]
 fn load(words: &[u16; LANES], first: usize) -> __m256i {
-    // SAFETY: a slice of 16 words of 16 bits is a register.
+    // SAFETY: a slice of 16 16-bit words fills a register.
     unsafe { _mm256_loadu_si256(words[first..first + HALF].as_ptr().cast()) }
 }
 
 #[target_feature(enable = "avx2")]
 #[inline]
 fn store(words: &mut [u16; LANES], first: usize, value: __m256i) {
-    // SAFETY: a slice of 16 words of 16 bits is a register.
+    // SAFETY: a slice of 16 16-bit words fills a register.
     unsafe { _mm256_storeu_si256(words[first..first + HALF].as_mut_ptr().cast(), value) }
 }
 
@@ -283,7 +283,7 @@ fn store(words: &mut [u16; LANES], first: usize, value: __m256i) {
 #[inline]
 fn load_two(words: &[u32; LANES], first: usize) -> (__m256i, __m256i) {
     let words = &words[first..first + HALF];
-    // SAFETY: 16 words of 32 bits are two registers.
+    // SAFETY: 16 32-bit words fill two registers.
     unsafe {
         let first = words.as_ptr().cast::<__m256i>();
         (_mm256_loadu_si256(first), _mm256_loadu_si256(first.add(1)))
@@ -327,7 +327,7 @@ mod tests {
         }
         for first in (i16::MIN..=i16::MAX).step_by(16) {
             let x: [i16; 16] = core::array::from_fn(|lane| first + lane as i16);
-            // SAFETY: the processor has been found to have AVX2.
+            // SAFETY: AVX2 was detected on this processor.
             assert_eq!(unsafe { activate_16(&x) }, x.map(activate));
         }
     }

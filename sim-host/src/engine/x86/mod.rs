@@ -1,7 +1,7 @@
 //! x86-64 vector paths. The only unsafe code of the crate is in this folder: intrinsics that use
 //! pointers, and calls of functions compiled for instructions that not every processor has. These
-//! calls are in methods of [`Avx2`] and [`Avx512`], whose values exist only if the processor was
-//! found to have the instructions.
+//! calls are in methods of [`Avx2`] and [`Avx512`], which can be constructed only after the
+//! instructions have been detected at run time.
 #![allow(unsafe_code)]
 
 pub(super) mod avx2;
@@ -85,7 +85,7 @@ impl Avx512 {
         unsafe { avx512::actions::fill_table(controller, order, entries) }
     }
 
-    /// Turns the robots that turn and lists those that may move; returns the number of the latter.
+    /// Applies all turns and lists the robots that may move; returns the length of the list.
     pub(super) fn sense_and_decide(self, sensing: Sensing<'_>) -> usize {
         // SAFETY: `self` exists only if the processor has the instructions.
         unsafe { avx512::sensing::sense_and_decide(sensing) }

@@ -1,5 +1,5 @@
-//! The whole action table, 32 windows at once: they differ only in their lowest five bits, so the
-//! rest of each hidden sum is the same number.
+//! The whole action table, 32 windows at once: the windows of a batch differ only in their lowest
+//! five bits, so the rest of each hidden sum is constant.
 
 use super::super::super::actions::{STRAIGHT, TURN_LEFT, TURN_RIGHT};
 use super::super::super::network::HiddenSum;
@@ -8,9 +8,9 @@ use super::activation::Activation;
 use core::arch::x86_64::*;
 use minimal_surprise_controller::Controller;
 
-/// Hidden neurons of an action network, used or not.
+/// Maximum number of hidden neurons of an action network.
 const HIDDEN: usize = 8;
-/// Windows at once.
+/// Number of windows at once.
 const BATCH: usize = 32;
 
 /// Fills the entries of all windows.
@@ -66,14 +66,14 @@ pub(in super::super) fn fill_table(
     }
 }
 
-/// Two weights, for every lane.
+/// Packs two weights into every lane.
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn pair(even: i16, odd: i16) -> __m512i {
     _mm512_set1_epi32((u32::from(even as u16) | u32::from(odd as u16) << 16) as i32)
 }
 
-/// A table in two registers, arranged so that packing them restores its order.
+/// Loads a table into two registers, arranged so that packing restores the order of the table.
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn in_packing_order(table: &[i32; 32]) -> (__m512i, __m512i) {
@@ -81,7 +81,7 @@ fn in_packing_order(table: &[i32; 32]) -> (__m512i, __m512i) {
         core::array::from_fn(|lane| table[lane / 4 * 8 + lane % 4 + 4 * second])
     };
     let (first, second) = (half(0), half(1));
-    // SAFETY: 16 words of 32 bits are a register.
+    // SAFETY: 16 32-bit words fill a register.
     unsafe {
         (
             _mm512_loadu_si512(first.as_ptr().cast()),

@@ -1,4 +1,4 @@
-//! The activation, 32 at once.
+//! The activation, for 32 values at once.
 
 use core::arch::x86_64::*;
 use minimal_surprise_controller::activation::{SEGMENT_SCALE, SEGMENTS};
@@ -50,7 +50,7 @@ impl Activation {
         }
     }
 
-    /// `activate` of every 16-bit lane.
+    /// Computes `activate` of every 16-bit lane.
     #[target_feature(enable = "avx512f,avx512bw")]
     #[inline]
     pub(super) fn activate(self, x: __m512i) -> __m512i {
@@ -67,8 +67,8 @@ impl Activation {
         _mm512_mask_sub_epi16(r, _mm512_movepi16_mask(x), _mm512_setzero_si512(), r)
     }
 
-    /// `activate` of two registers of sums (Q24, rounding term included). Each 128 bits of the
-    /// result have four lanes of `low`, then four of `high`.
+    /// Computes `activate` of two registers of sums (Q24, including the rounding term). Each 128
+    /// bits of the result have four lanes of `low`, then four lanes of `high`.
     #[target_feature(enable = "avx512f,avx512bw")]
     #[inline]
     pub(super) fn activate_sums(self, low: __m512i, high: __m512i) -> __m512i {
@@ -104,7 +104,7 @@ mod tests {
         }
         for first in (i16::MIN..=i16::MAX).step_by(32) {
             let x: [i16; 32] = core::array::from_fn(|lane| first + lane as i16);
-            // SAFETY: the processor has been found to have AVX-512.
+            // SAFETY: AVX-512 was detected on this processor.
             assert_eq!(unsafe { activate_32(&x) }, x.map(activate));
         }
     }

@@ -1,8 +1,8 @@
-//! Prediction networks of 32 robots: sums of 16 robots per register, activations of 32.
+//! Prediction networks of 32 robots: 16 sums or 32 activations per register.
 //!
-//! Packing two registers of sums into one of activations interleaves them by fours, and unpacking
-//! undoes that. So hidden activations are in the robots' order wherever they are 32 bits wide, and
-//! windows are put into the packed order when blocks are split into steps.
+//! Packing two registers of sums into one register of activations interleaves them by fours, and
+//! unpacking restores the order. So 32-bit hidden activations are in the order of the robots, and
+//! windows are converted to the packed order when blocks are split into steps.
 
 use super::super::super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, PAIRS};
 use super::super::super::network::PredictionWeights;
@@ -25,7 +25,7 @@ pub(in super::super::super) struct Network {
     expected_empty_at_start: u16,
 }
 
-/// Two weights as one factor of a product of pairs.
+/// Packs two weights into one factor of a product of pairs.
 fn pair(even: i16, odd: i16) -> i32 {
     (u32::from(even as u16) | u32::from(odd as u16) << 16) as i32
 }
@@ -59,7 +59,7 @@ impl Network {
         network
     }
 
-    /// See [`super::super::super::lanes::Predictor::run_block`].
+    /// Runs one block; see [`super::super::super::lanes::Predictor::run_block`].
     #[target_feature(enable = "avx512f,avx512bw,avx512vbmi2,avx512vnni,avx512bitalg")]
     pub(in super::super) fn run_block(
         &self,
@@ -85,7 +85,8 @@ impl Network {
         matches: &mut Matches,
     ) -> u32 {
         let windows = windows_in_packed_order(&blocks.inputs);
-        // In turn, one holds the last hidden activations and the other receives the next.
+        // The two buffers alternate: one holds the last hidden activations, the other receives the
+        // next.
         let mut even = Hidden::<USED>::load(lanes);
         let mut odd = Hidden::<USED>::none();
         let at_start = _mm512_set1_epi16(self.expected_empty_at_start as i16);
@@ -120,9 +121,9 @@ impl Network {
     }
 
     /// Runs one step: computes the next hidden activations and returns the window bits that the
-    /// last ones predict not occupied, in packed order.
+    /// last activations predict not occupied, in packed order.
     ///
-    /// The two depend on the last activations only, so neither waits for the other's results.
+    /// Both results depend only on the last activations, so neither waits for the other.
     #[target_feature(enable = "avx512f,avx512bw,avx512vbmi2,avx512vnni")]
     #[inline]
     fn step<const USED: usize>(
@@ -163,7 +164,7 @@ impl Network {
         }
     }
 
-    /// The hidden sums of 16 robots, from their windows and last activations.
+    /// Computes the hidden sums of 16 robots from their windows and last activations.
     #[target_feature(enable = "avx512f,avx512vnni")]
     #[inline]
     fn hidden_sum(&self, neuron: usize, windows: [__m512i; 3], last: __m512i) -> __m512i {
@@ -200,17 +201,17 @@ impl Network {
     }
 }
 
-/// A run of outputs that predict neighbouring window bits.
+/// Consecutive outputs that predict neighbouring window bits.
 struct Run {
-    /// Their bits among the signs of all outputs.
+    /// Bits of the run among the signs of all outputs.
     signs: u16,
     /// Distance from these bits to the window bits.
     shift: u32,
 }
 
 impl Run {
-    /// The runs of outputs that predict these bits, the highest first. The last output's sign is
-    /// bit 0.
+    /// Returns the runs of outputs that predict these bits, with the highest bits first. The sign
+    /// of the last output is bit 0.
     fn all(window_bits: impl DoubleEndedIterator<Item = u32>) -> Vec<Self> {
         let mut runs: Vec<Self> = Vec::new();
         for (sign, bit) in window_bits.rev().enumerate() {
@@ -227,7 +228,7 @@ impl Run {
     }
 }
 
-/// Windows, and windows shifted by five and by ten bits: indices into tables of 32 entries.
+/// Returns windows, and windows shifted by five and by ten bits: indices into tables of 32 entries.
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn by_fives(windows: __m512i) -> [__m512i; 3] {
@@ -238,11 +239,11 @@ fn by_fives(windows: __m512i) -> [__m512i; 3] {
     ]
 }
 
-/// The entries selected by the lowest five bits of the indices.
+/// Looks up the entries selected by the lowest five bits of the indices.
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn look_up(table: &[i32; 32], indices: __m512i) -> __m512i {
-    // SAFETY: 32 words of 32 bits are two registers.
+    // SAFETY: 32 32-bit words fill two registers.
     let (first, second) = unsafe {
         let first = table.as_ptr().cast::<__m512i>();
         (_mm512_loadu_si512(first), _mm512_loadu_si512(first.add(1)))
@@ -250,7 +251,7 @@ fn look_up(table: &[i32; 32], indices: __m512i) -> __m512i {
     _mm512_permutex2var_epi32(first, indices, second)
 }
 
-/// Hidden activations in pairs, of the first 16 robots and of the others.
+/// Hidden activations in pairs: those of the first 16 robots, and those of the others.
 struct Hidden<const USED: usize> {
     low: [__m512i; USED],
     high: [__m512i; USED],
@@ -276,7 +277,7 @@ impl<const USED: usize> Hidden<USED> {
         hidden
     }
 
-    /// One bit per robot, set if its activations have not changed.
+    /// Stores the activations; returns one bit per robot, set if its activations have not changed.
     #[target_feature(enable = "avx512f")]
     #[inline]
     fn store_and_compare(&self, lanes: &mut Lanes) -> u32 {
@@ -292,7 +293,7 @@ impl<const USED: usize> Hidden<USED> {
     }
 }
 
-/// Bits of robots in packed order.
+/// Converts one bit per robot to packed order.
 #[target_feature(enable = "avx512f,avx512bw")]
 #[inline]
 fn in_packed_order(robots: u32) -> __mmask32 {
@@ -300,8 +301,8 @@ fn in_packed_order(robots: u32) -> __mmask32 {
     _mm512_movepi16_mask(_mm512_permutexvar_epi16(load(&PACKED_ORDER.0), bits))
 }
 
-/// `_mm512_dpwssd_epi32`, which the compiler would split into a multiplication and an addition to
-/// shorten a chain; but there are enough independent chains to hide the latency.
+/// Computes `_mm512_dpwssd_epi32`, which the compiler would split into a multiplication and an
+/// addition to shorten a dependency chain; but enough independent chains hide the latency.
 #[target_feature(enable = "avx512f,avx512vnni")]
 #[inline]
 fn add_products(mut sum: __m512i, a: __m512i, b: __m512i) -> __m512i {
@@ -318,7 +319,7 @@ fn add_products(mut sum: __m512i, a: __m512i, b: __m512i) -> __m512i {
     sum
 }
 
-/// A register in memory.
+/// A table that is one register in size.
 #[repr(align(64))]
 struct Lookup([u16; LANES]);
 
@@ -344,8 +345,8 @@ static ROBOT_ORDER: Lookup = {
     Lookup(order)
 };
 
-/// Takes two steps of eight robots from each of two registers of blocks: the first 16 entries of
-/// the packed order, for the first step and for the second.
+/// Indices that take two steps of eight robots from two registers of blocks: the first 16 entries
+/// of the packed order, for the first step and for the second.
 static TWO_STEPS: Lookup = {
     let mut places = [0; LANES];
     let mut place = 0;
@@ -359,11 +360,11 @@ static TWO_STEPS: Lookup = {
     Lookup(places)
 };
 
-/// The windows of each step of some blocks.
+/// Splits blocks into the windows of each step.
 #[target_feature(enable = "avx512f,avx512bw")]
 #[inline]
 fn windows_in_packed_order(blocks: &[u64; LANES]) -> [__m512i; BLOCK_STEPS] {
-    // SAFETY: 32 words of 64 bits are four registers.
+    // SAFETY: 32 64-bit words fill four registers.
     let quarter =
         |q: usize| unsafe { _mm512_loadu_si512(blocks.as_ptr().cast::<__m512i>().add(q)) };
     let [a, b, c, d] = core::array::from_fn(quarter);
@@ -385,21 +386,21 @@ fn windows_in_packed_order(blocks: &[u64; LANES]) -> [__m512i; BLOCK_STEPS] {
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn load(words: &[u16; LANES]) -> __m512i {
-    // SAFETY: 32 words of 16 bits are a register.
+    // SAFETY: 32 16-bit words fill a register.
     unsafe { _mm512_loadu_si512(words.as_ptr().cast()) }
 }
 
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn store(words: &mut [u16; LANES], value: __m512i) {
-    // SAFETY: 32 words of 16 bits are a register.
+    // SAFETY: 32 16-bit words fill a register.
     unsafe { _mm512_storeu_si512(words.as_mut_ptr().cast(), value) }
 }
 
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn load_two(words: &[u32; LANES]) -> (__m512i, __m512i) {
-    // SAFETY: 32 words of 32 bits are two registers.
+    // SAFETY: 32 32-bit words fill two registers.
     unsafe {
         let first = words.as_ptr().cast::<__m512i>();
         (_mm512_loadu_si512(first), _mm512_loadu_si512(first.add(1)))
@@ -409,7 +410,7 @@ fn load_two(words: &[u32; LANES]) -> (__m512i, __m512i) {
 #[target_feature(enable = "avx512f")]
 #[inline]
 fn store_two(words: &mut [u32; LANES], low: __m512i, high: __m512i) {
-    // SAFETY: 32 words of 32 bits are two registers.
+    // SAFETY: 32 32-bit words fill two registers.
     unsafe {
         let first = words.as_mut_ptr().cast::<__m512i>();
         _mm512_storeu_si512(first, low);

@@ -12,7 +12,7 @@ use super::super::super::window::{ACTION_BIT, AHEAD_BIT, ROW_BITS, WINDOWS};
 use super::super::Sensing;
 use core::arch::x86_64::*;
 
-/// Bits of a coordinate in a robot word.
+/// Number of bits of a coordinate in a robot word.
 const Y_SHIFT: u32 = POSITION.trailing_ones() / 2;
 const COORDINATE: i32 = (1 << Y_SHIFT) - 1;
 
@@ -34,8 +34,8 @@ pub(in super::super) fn sense_and_decide(sensing: Sensing<'_>) -> usize {
     }
 }
 
-/// The cells around a robot, in the lowest 15 bits; other bits are undefined. `upright` are the
-/// robots facing north or south.
+/// The cells around a robot, in the lowest 15 bits; other bits are undefined. In the functions that
+/// fetch them, `upright` selects the robots facing north or south.
 type Fetched = __m512i;
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi2,gfni")]
@@ -73,7 +73,7 @@ fn all_robots(
     {
         let first = place * ROBOTS_AT_ONCE;
         let present = robots_present(robots - first);
-        // SAFETY: a chunk of 16 words of 32 bits is a register.
+        // SAFETY: a chunk of 16 32-bit words fills a register.
         let word = unsafe { _mm512_loadu_si512(words.as_ptr().cast()) };
         let x = _mm512_and_si512(word, coordinate);
         let y = _mm512_and_si512(_mm512_srli_epi32::<Y_SHIFT>(word), coordinate);
@@ -88,8 +88,8 @@ fn all_robots(
         let reading = match flips {
             None => seen,
             Some(flips) => {
-                // SAFETY: 16 bits are read for each robot present, and there are as many flips as
-                // robots.
+                // SAFETY: 16 bits are read per robot present, and the number of flips equals the
+                // number of robots.
                 let flips =
                     unsafe { _mm256_maskz_loadu_epi16(present, flips[first..].as_ptr().cast()) };
                 _mm512_xor_si512(seen, _mm512_cvtepu16_epi32(flips))
@@ -101,7 +101,7 @@ fn all_robots(
             action_bit,
         );
         let window = _mm512_or_si512(reading, last_action);
-        // SAFETY: a window is below 2¹⁵, and the table has that many bytes plus three.
+        // SAFETY: a window is below 2¹⁵, and the size of the table is 2¹⁵ bytes plus three.
         let entry = unsafe { _mm512_i32gather_epi32::<1>(window, entries.as_ptr().cast()) };
         let entry = _mm512_slli_epi32::<ENTRY_SHIFT>(entry);
         let turned = _mm512_add_epi32(word, entry);
@@ -112,12 +112,12 @@ fn all_robots(
         let new_action =
             _mm512_srli_epi32::<{ ACTION.trailing_zeros() - ACTION_BIT.trailing_zeros() }>(entry);
         let input = _mm512_ternarylogic_epi32::<0xca>(action_bit, new_action, reading);
-        // SAFETY: a chunk of 16 words of 16 bits is half a register.
+        // SAFETY: a chunk of 16 16-bit words fills half a register.
         unsafe {
             _mm256_storeu_si256(inputs.as_mut_ptr().cast(), _mm512_cvtepi32_epi16(input));
         }
         let moving = _mm512_mask_testn_epi32_mask(may_move & present, entry, action);
-        // SAFETY: at most `first` robots are listed, and the list has room for `first + 16`.
+        // SAFETY: at most `first` robots are listed, and the list has space for `first + 16`.
         unsafe {
             let end = movers.as_mut_ptr().add(listed);
             _mm512_storeu_si512(end.cast(), _mm512_maskz_compress_epi32(moving, robot));
@@ -136,13 +136,13 @@ fn robots_present(left: usize) -> __mmask16 {
     }
 }
 
-/// The window of a robot facing the opposite way: its 15 bits in reverse order.
+/// Returns the window of a robot facing the opposite direction: its 15 bits in reverse order.
 #[target_feature(enable = "avx512f,avx512bw,gfni")]
 #[inline]
 fn half_a_turn_on(window: __m512i) -> __m512i {
-    // Reverses the bits of a byte.
+    // Matrix that reverses the bits of a byte.
     let reversal = _mm512_set1_epi64(0x8040_2010_0804_0201_u64 as i64);
-    // Exchanges the lower two bytes of 32 bits and clears the others.
+    // Indices that exchange the lower two bytes of 32 bits and clear the others.
     let exchange = _mm512_set4_epi32(
         0x8080_0c0d_u32 as i32,
         0x8080_0809_u32 as i32,
@@ -164,9 +164,9 @@ fn merge(right: __m512i, middle: __m512i, left: __m512i) -> Fetched {
 }
 
 /// Rows and columns of a board with at most 16 · `N` of each. The borders at the ends of lines are
-/// filled in, and each line is rotated to the position of its cells in a window.
+/// filled, and each line is rotated to the position of its cells in a window.
 struct LinesInRegisters<const N: usize> {
-    /// Indexed by the robot's line: the line before it, the line, the line after it.
+    /// Rows, indexed by the robot's line: the line before it, the line, the line after it.
     rows: [[__m512i; N]; 3],
     columns: [[__m512i; N]; 3],
     width: __m512i,
@@ -229,7 +229,7 @@ impl<const N: usize> LinesInRegisters<N> {
     }
 }
 
-/// Rows and columns of a board of any size, borders up to date.
+/// Rows and columns of a board of any size, with up-to-date borders.
 struct LinesInMemory<'a> {
     rows: &'a Plane,
     columns: &'a Plane,
@@ -267,9 +267,9 @@ impl<'a> LinesInMemory<'a> {
         );
         let shift = _mm512_and_si512(along, _mm512_set1_epi32(7));
         let [right, middle, left] = core::array::from_fn(|row| {
-            // SAFETY: `line` and `along` are a robot's, which is on the board. So `place` is in the
-            // line before it, and each of the three reads of four bytes ends at most one word after
-            // the last line; planes have that word.
+            // SAFETY: `line` and `along` belong to a robot on the board. So `place` is in the line
+            // before it, and each of the three reads of four bytes ends at most one word after the
+            // last line; planes have that word.
             let words = unsafe {
                 let lines = plane.words().as_ptr().cast::<u8>().add(row * line_bytes);
                 _mm512_mask_i32gather_epi32::<1>(zero, robots, place, lines.cast())
