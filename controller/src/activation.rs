@@ -68,7 +68,7 @@ pub(crate) static ROWS: [[i32; 4]; 32] = {
 ///
 /// Odd, monotone, in \[−4095, 4095\]; `act(−32768) = act(−32767)`. Tests:
 /// `activation_error_max_all_inputs`, `activation_is_odd_and_monotone`,
-/// `value_stability_activation`. Departure from the paper: it uses tanh in floating point.
+/// `value_stability_activation`. Departure from the paper: the paper uses tanh in floating point.
 #[inline]
 #[must_use]
 pub fn activate(x_q3_12: i16) -> i16 {

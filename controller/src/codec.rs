@@ -111,7 +111,7 @@ pub enum DecodeError {
         found: u8,
     },
     /// The checksum does not match: the bytes were damaged.
-    #[error("damaged: CRC-32C is {found:08x}, the bytes give {computed:08x}")]
+    #[error("damaged: the stored CRC-32C is {found:08x}, the computed one {computed:08x}")]
     BadCrc {
         /// The stored checksum.
         found: u32,
@@ -119,7 +119,7 @@ pub enum DecodeError {
         computed: u32,
     },
     /// The header length byte is too large.
-    #[error("a header of {found} bytes; there is room for at most {room}")]
+    #[error("a header of {found} bytes; at most {room} fit")]
     HeaderTooLong {
         /// The header length byte.
         found: usize,

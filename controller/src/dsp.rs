@@ -59,7 +59,7 @@ pub(crate) fn activate_all<const N: usize>(values: &mut [i16; N], count: usize) 
 /// Number of terms in each sum of [`output_signs`].
 pub(crate) const OUTPUT_TERMS: usize = 14;
 
-/// The hidden layer before activation: for each of the first `count` rows, computes the Q3.12 sum
+/// Computes the hidden layer before activation: for each of the first `count` rows, the Q3.12 sum
 /// of its products with `terms`, with the row's entry of `values` as the last term, and stores the
 /// sum in that entry.
 #[inline]

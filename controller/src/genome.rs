@@ -291,15 +291,15 @@ mod tests {
         type Error = Infallible;
 
         fn try_next_u32(&mut self) -> Result<u32, Infallible> {
-            Ok(self.0.next().expect("no word is left"))
+            Ok(self.0.next().expect("a word is left"))
         }
 
         fn try_next_u64(&mut self) -> Result<u64, Infallible> {
-            unreachable!("weights take words of 32 bits")
+            unreachable!("weights use 32-bit words")
         }
 
         fn try_fill_bytes(&mut self, _: &mut [u8]) -> Result<(), Infallible> {
-            unreachable!("weights take words of 32 bits")
+            unreachable!("weights use 32-bit words")
         }
     }
 
@@ -331,7 +331,7 @@ mod tests {
         for low in [256, 257, u32::MAX] {
             let mut script = Script([of_4097(low), u32::MAX].into_iter());
             uniform_within(&mut script, 2048);
-            assert_eq!(script.0.next(), Some(u32::MAX), "{low} is taken");
+            assert_eq!(script.0.next(), Some(u32::MAX), "{low} is accepted");
         }
     }
 

@@ -221,14 +221,14 @@ impl<const H: usize, const O: usize> Network<H, O> {
         })
     }
 
-    /// Returns hidden weights (Q3.12): one row per neuron, the self-loop at [`SELF_LOOP`]; zero
+    /// Returns the hidden weights (Q3.12): one row per neuron, the self-loop at [`SELF_LOOP`]; zero
     /// beyond the shape.
     #[must_use]
     pub fn hidden_rows(&self) -> &[[i16; MAX_TERMS]; H] {
         &self.hidden.0
     }
 
-    /// Returns output weights (Q3.12): one row per output; zero beyond the shape.
+    /// Returns the output weights (Q3.12): one row per output; zero beyond the shape.
     #[must_use]
     pub fn output_rows(&self) -> &[[i16; H]; O] {
         &self.output.0

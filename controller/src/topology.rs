@@ -162,7 +162,7 @@ impl Topology {
         self.model
     }
 
-    /// Returns which predictions are fixed.
+    /// Returns the division between network and fixed predictions.
     #[must_use]
     pub const fn prediction(self) -> Prediction {
         self.prediction
@@ -200,7 +200,7 @@ impl Topology {
         }
     }
 
-    /// Returns shape of the action network.
+    /// Returns the shape of the action network.
     #[must_use]
     pub const fn action_shape(self) -> Shape {
         match self.model {

@@ -53,16 +53,16 @@ pub enum RequestError {
     #[error("the robot has not replied to the last request yet")]
     Pending,
     /// The session does not begin with [`Request::Identify`].
-    #[error("the first request of a session is to identify")]
+    #[error("the first request of a session must be to identify")]
     IdentifyFirst,
     /// The chunk has more than [`CHUNK_BYTES_MAX`] bytes.
-    #[error("a chunk of {found} bytes; at most {CHUNK_BYTES_MAX} go into a request")]
+    #[error("a chunk of {found} bytes; at most {CHUNK_BYTES_MAX} fit a request")]
     ChunkTooLong {
         /// Size of the chunk, in bytes.
         found: usize,
     },
     /// All 2³² numbers are used; open a new session.
-    #[error("no number is left for a request; open a new session")]
+    #[error("all request numbers are used; open a new session")]
     SessionExhausted,
 }
 

@@ -239,7 +239,7 @@ pub struct LineCounters {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
     /// The session is unknown: the robot was restarted, or a different host uses the line.
-    #[error("the robot has lost the session: it was restarted, or another program talks to it")]
+    #[error("the robot has lost the session: it was restarted, or another program uses the line")]
     NoSession,
     /// The robot must be stopped first.
     #[error("the robot is running; stop it first")]
@@ -267,7 +267,7 @@ pub enum Refusal {
     #[error("the robot's flash has failed")]
     Flash,
     /// This robot does not support the request.
-    #[error("the robot cannot do that")]
+    #[error("the robot does not support the request")]
     Unsupported,
     /// The slots' write count has reached its maximum. Firmware older than this variant replies
     /// with [`Refusal::Flash`].

@@ -76,14 +76,14 @@ pub trait Handler {
 /// let received = client.request(&Request::Identify)?.to_vec();
 ///
 /// let mut server = Server::new();
-/// let mut answers = 0;
+/// let mut replies = 0;
 /// for byte in received {
 ///     if let Some(frame) = server.feed(byte, &mut robot) {
 ///         assert_eq!(frame.first(), Some(&0), "frames start and end with zero");
-///         answers += 1;
+///         replies += 1;
 ///     }
 /// }
-/// assert_eq!(answers, 1);
+/// assert_eq!(replies, 1);
 /// assert_eq!(server.counters().accepted, 1);
 /// # Ok::<(), minimal_surprise_link::RequestError>(())
 /// ```

@@ -67,7 +67,7 @@ fn percent(rng: &mut ChaCha8Rng, share: usize) -> bool {
 
 fn wire_of(message: &impl Serialize) -> Vec<u8> {
     let mut wire = [0; WIRE_BYTES_MAX];
-    let length = encode(message, &mut wire).expect("it fits");
+    let length = encode(message, &mut wire).expect("the message fits");
     wire[..length].to_vec()
 }
 
@@ -558,7 +558,7 @@ fn a_genome_gets_through_an_unreliable_line_and_is_written_once() {
         let mut robot = LinkRobot::start(flash);
         match robot.slots.in_use(&mut Buffer::new()) {
             InUse::Slot { genome, .. } => assert_eq!(genome, decoded, "run {run}"),
-            InUse::BuiltIn => panic!("run {run}: the update was acknowledged"),
+            InUse::BuiltIn => panic!("run {run}: no genome"),
         }
     }
     println!("{runs} genomes written: {needed} requests needed {frames_sent} frames");

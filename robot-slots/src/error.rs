@@ -9,7 +9,7 @@ use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 #[non_exhaustive]
 pub enum PlaceError {
     /// The offset is not aligned to the chip's erase units.
-    #[error("slots at {offset}: not a multiple of the {erase_size} bytes erased at a time")]
+    #[error("slots at {offset}, which is not a multiple of the erase size of {erase_size} bytes")]
     NotAligned {
         /// The byte address requested.
         offset: u32,
@@ -17,7 +17,7 @@ pub enum PlaceError {
         erase_size: usize,
     },
     /// The second slot does not fit into the flash.
-    #[error("two slots of {slot_bytes} bytes at {offset} do not fit a flash of {capacity}")]
+    #[error("two slots of {slot_bytes} bytes at {offset} do not fit a flash of {capacity} bytes")]
     OutOfBounds {
         /// The byte address requested.
         offset: u32,
@@ -62,7 +62,7 @@ pub enum UpdateError<E: core::fmt::Debug> {
         found: usize,
     },
     /// The write count has reached its maximum, after 2³² − 1 updates.
-    #[error("no more updates can be counted")]
+    #[error("the write count has reached its maximum")]
     CountExhausted,
     /// No update is in progress.
     #[error("no update has begun")]
@@ -84,7 +84,7 @@ pub enum UpdateError<E: core::fmt::Debug> {
         length: u16,
     },
     /// The container is incomplete. The update continues.
-    #[error("{taken} of {length} bytes have arrived")]
+    #[error("only {taken} of {length} bytes have arrived")]
     Incomplete {
         /// Number of bytes received so far.
         taken: u16,
@@ -92,7 +92,7 @@ pub enum UpdateError<E: core::fmt::Debug> {
         length: u16,
     },
     /// The bytes read back differ from those written. The update is aborted; begin a new one.
-    #[error("the flash does not hold what was written")]
+    #[error("the flash does not hold the bytes written")]
     NotWritten,
     /// The flash does not hold a genome that can be run. The update is aborted.
     #[error(transparent)]

@@ -197,7 +197,7 @@ fn cut_updates<const W: usize, const E: usize>(cuts: Cuts) -> u64 {
         };
         let mut flash = before.clone();
         flash.cut_power_after(first, first);
-        genomes.update(&mut flash, room).expect_err("power failed");
+        genomes.update(&mut flash, room).expect_err("power fails");
         made += 1;
         let after_first = genomes.after_restart(&mut flash, room);
 
@@ -222,14 +222,14 @@ fn cut_updates<const W: usize, const E: usize>(cuts: Cuts) -> u64 {
             case.second = Some(second);
             let mut flash = flash.clone();
             flash.cut_power_after(second, first << 32 | second);
-            genomes.update(&mut flash, room).expect_err("power failed");
+            genomes.update(&mut flash, room).expect_err("power fails");
             made += 1;
             let after_second = genomes.after_restart(&mut flash, room);
             if after_first == Runs::New {
                 assert_eq!(after_second, Runs::New, "the new genome was already in use");
             }
             if second % THIRD_STRIDE == first % THIRD_STRIDE {
-                genomes.update(&mut flash, room).expect("power is back");
+                genomes.update(&mut flash, room).expect("power is on");
                 assert_eq!(genomes.after_restart(&mut flash, room), Runs::New);
             }
         }
@@ -327,7 +327,7 @@ fn the_first_genome_of_a_robot_is_complete_or_absent() {
     for moment in 0..moments {
         let mut flash = Flash::new();
         flash.cut_power_after(moment, moment);
-        write(&mut flash, room).expect_err("power failed");
+        write(&mut flash, room).expect_err("power fails");
         flash.restore_power();
         let mut slots = Slots::open(&mut flash, Flash::OFFSET, room).unwrap();
         match slots.in_use(room) {
@@ -336,7 +336,7 @@ fn the_first_genome_of_a_robot_is_complete_or_absent() {
             }
             InUse::BuiltIn => built_in += 1,
         }
-        slots.write(&genome, room).expect("power is back");
+        slots.write(&genome, room).expect("power is on");
     }
     // The last byte can be correct although its write was interrupted.
     assert!(built_in >= moments - 9 && built_in < moments, "{built_in}");
@@ -376,7 +376,7 @@ fn a_damaged_genome_is_replaced_by_the_older_one_and_two_by_the_built_in_one() {
             .map(|slot| matches!(slots.state(slot), SlotState::Damaged(_, Defect::Refused(_))));
         assert_eq!(faults, [damaged == 0, true]);
         assert_eq!(slots.in_use(room) == InUse::BuiltIn, left.is_none());
-        assert_eq!(slots.write_count(), 2, "the count survives");
+        assert_eq!(slots.write_count(), 2, "the write count is kept");
     }
     let mut slots = Slots::open(&mut flash, Flash::OFFSET, room).unwrap();
     let genome = container(Topology::default(), 7);
@@ -561,7 +561,7 @@ fn empty_interrupted_and_unreadable_slots_are_distinguished() {
     }
 
     blank.cut_power_after(0, 0);
-    blank.write(0, &[0; 4]).expect_err("power failed");
+    blank.write(0, &[0; 4]).expect_err("power fails");
     assert_eq!(states(&mut blank), [SlotState::Unreadable; 2]);
     let mut slots = Slots::open(&mut blank, Flash::OFFSET, room).unwrap();
     assert_eq!(slots.begin(100, 7), Err(UpdateError::Flash(PowerCut)));
@@ -676,7 +676,7 @@ fn a_genome_other_than_the_announced_one_is_never_committed() {
         slots.write(&damaged, room),
         Err(UpdateError::Defect(Defect::Refused(_)))
     ));
-    assert_eq!(slots.release().counts.erases, erases, "nothing was erased");
+    assert_eq!(slots.release().counts.erases, erases, "no slot was erased");
 }
 
 #[test]

@@ -38,7 +38,7 @@ fn plain_worlds_step_of_100_robots(bencher: Bencher) {
     let controller = Controller::new(&genome());
     let trial = &trials.trials()[0];
     let grid = trials.scenario().grid();
-    let mut world = World::new(grid, &trial.starts, &controller).expect("a drawn start");
+    let mut world = World::new(grid, &trial.starts, &controller).expect("the start is valid");
     let mut noise = trial.noise.clone();
     bencher
         .counter(ItemsCount::new(100_usize))
@@ -80,7 +80,7 @@ fn structures_of_100_robots(bencher: Bencher) {
 }
 
 fn evaluator(path: &str) -> Evaluator {
-    let path = EnginePath::named(path).expect("one of those available");
+    let path = EnginePath::named(path).expect("the path is available");
     Evaluator::new(Engine::Fast, path)
 }
 

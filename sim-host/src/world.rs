@@ -47,7 +47,7 @@ pub enum WorldError {
 /// Checks that every robot is on the grid and no two share a cell.
 ///
 /// # Errors
-/// [`WorldError`] for the first robot that is outside the grid or on an occupied cell.
+/// [`WorldError`] if a robot is outside the grid or two share a cell; describes the first one.
 pub fn check_poses(grid: Grid, poses: &[Pose]) -> Result<(), WorldError> {
     // Memory and time depend only on the number of robots: a file with few robots may contain any
     // grid size.

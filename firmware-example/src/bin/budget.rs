@@ -54,8 +54,8 @@ global_asm!(
 #[entry]
 fn main() -> ! {
     let reset_ticks = RELOAD - SYST::get_current();
-    let peripherals = Peripherals::take().expect("taken once");
-    let counter = Counter::new(peripherals.SYST).expect("SysTick follows the instructions");
+    let peripherals = Peripherals::take().expect("first call");
+    let counter = Counter::new(peripherals.SYST).expect("SysTick counts instructions");
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
 
     let mut layer_most = 0;
@@ -84,7 +84,7 @@ fn main() -> ! {
                 matched_bits: u64::MAX,
                 scored_bits: u64::MAX,
             };
-            let bytes = encode(&genome, provenance, &mut container).expect("there is room");
+            let bytes = encode(&genome, provenance, &mut container).expect("it fits");
             let depth = stack::depth(&mut || {
                 black_box(decode(black_box(bytes)));
             });
@@ -92,8 +92,8 @@ fn main() -> ! {
             let depth = stack::depth(&mut || build(black_box(bytes)));
             build_depth = build_depth.max(depth);
 
-            let mut slots = Slots::open(&mut flash, 0, &mut room).expect("there is room");
-            slots.write(bytes, &mut room).expect("it can be written");
+            let mut slots = Slots::open(&mut flash, 0, &mut room).expect("the slots fit");
+            slots.write(bytes, &mut room).expect("the genome fits");
             let depth = stack::depth(&mut || open(&mut flash, &mut room));
             open_depth = open_depth.max(depth);
             let (instructions, controller) = counter.count(|| start(&mut flash, &mut room));
@@ -162,7 +162,7 @@ fn build(bytes: &[u8]) {
 /// Runs the code that a robot runs at its start.
 #[inline(never)]
 fn start(flash: &mut MemoryFlash, room: &mut Buffer) -> Controller {
-    let mut slots = Slots::open(flash, 0, room).expect("there is room");
+    let mut slots = Slots::open(flash, 0, room).expect("the slots fit");
     let in_use = slots.in_use(room);
     assert!(matches!(in_use, InUse::Slot { .. }));
     in_use.controller()

@@ -24,8 +24,8 @@ const STEPS_PER_GENOME: u32 = 100;
 
 #[entry]
 fn main() -> ! {
-    let peripherals = Peripherals::take().expect("taken once");
-    let counter = Counter::new(peripherals.SYST).expect("SysTick follows the instructions");
+    let peripherals = Peripherals::take().expect("first call");
+    let counter = Counter::new(peripherals.SYST).expect("SysTick counts instructions");
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
 
     let mut most = 0;

@@ -11,7 +11,7 @@ use firmware_example::robot::{Board, Motion};
 
 #[entry]
 fn main() -> ! {
-    let peripherals = Peripherals::take().expect("taken once");
+    let peripherals = Peripherals::take().expect("first call");
     Mps2::new(peripherals.SYST).drive(Motion::Ahead);
     provoke()
 }

@@ -20,7 +20,7 @@ use firmware_example::robot::Robot;
 
 #[entry]
 fn main() -> ! {
-    let peripherals = Peripherals::take().expect("taken once");
+    let peripherals = Peripherals::take().expect("first call");
     let flash = match FileFlash::open() {
         Ok(flash) => flash,
         Err(error) => {

@@ -38,7 +38,7 @@ pub(super) fn pose(word: u32) -> Pose {
     }
 }
 
-/// Returns coordinates shifted to their bit positions.
+/// Returns the coordinates shifted to their bit positions.
 pub(super) fn position(x: u32, y: u32) -> u32 {
     x | y << COORDINATE_BITS
 }

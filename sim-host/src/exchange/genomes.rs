@@ -26,7 +26,7 @@ const ROWS: [&str; 3] = ["input row", "hidden row", "output row"];
 /// more generations, starting with generation 0.
 ///
 /// # Errors
-/// [`ExchangeError`] for the first invalid line.
+/// [`ExchangeError`] if a line is invalid; contains the number of the first one.
 pub fn read_genomes(text: &str) -> Result<Vec<GenomeRows>, ExchangeError> {
     generations(text).map(|rows| rows?.numbers()).collect()
 }
@@ -82,7 +82,7 @@ impl RowsOfText<'_> {
     /// Parses the numbers in the rows.
     ///
     /// # Errors
-    /// [`ExchangeError`] for the first invalid line.
+    /// [`ExchangeError`] if a line is invalid; contains the number of the first one.
     pub fn numbers(&self) -> Result<GenomeRows, ExchangeError> {
         let mut rows = [const { Vec::new() }; 3];
         for ((line, text), row) in (self.line..).zip(self.rows).zip(&mut rows) {

@@ -841,7 +841,7 @@ fn structures_stay_the_same_when_the_swarm_is_shifted_rotated_or_renumbered() {
         check(grid, &renumbered);
     }
     // Lattices are too rare to occur in random swarms.
-    println!("members met: {seen:?}");
+    println!("members found: {seen:?}");
     assert!(seen[..6].iter().all(|&count| count > 0));
 }
 
