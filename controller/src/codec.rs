@@ -225,9 +225,9 @@ impl<'a> EncodedGenome<'a> {
     /// Checks every part of a container.
     ///
     /// # Errors
-    /// [`DecodeError`]: the first error found, in the order magic, version, length, checksum,
-    /// header, kernel, topology, sizes, weights. Input shorter than [`PREFIX_BYTES`] is reported
-    /// before all other errors.
+    /// [`DecodeError`] if a check fails: the first error, in the order magic, version, length,
+    /// checksum, header, kernel, topology, sizes, weights. Input shorter than [`PREFIX_BYTES`] is
+    /// reported before all other errors.
     pub fn decode(bytes: &'a [u8]) -> Result<Self, DecodeError> {
         let prefix = Prefix::read(bytes)?;
         let block = checked_block(bytes, prefix.container_bytes)?;

@@ -107,7 +107,7 @@ impl Controller {
         Self::build(genome.topology(), &mut genome.weights().iter().copied())
     }
 
-    /// Builds the controller of a decoded container, without copying the weights.
+    /// Builds a controller from a decoded container, without copying the weights.
     #[must_use]
     pub fn from_encoded(genome: &EncodedGenome<'_>) -> Self {
         Self::build(genome.topology(), &mut genome.weights())
@@ -141,8 +141,8 @@ impl Controller {
     /// action.
     ///
     /// Ignores bits beyond the model's sensors. Cannot fail, panic or allocate.
-    // One copy, compiled in this crate: a firmware may optimise this crate for speed and the rest
-    // for size.
+    // Compiled only once, in this crate, so that a firmware can optimise this crate for speed and
+    // the rest for size.
     #[cfg_attr(has_smlad, inline(never))]
     #[cfg_attr(not(has_smlad), inline)]
     pub fn step(&self, state: &mut State, sensors: SensorBits) -> Decision {

@@ -14,7 +14,7 @@
 //! | range or bearing not a number or infinite, range negative | rejected by [`Neighbours::push`], counted in [`Neighbours::refused`] |
 //! | outside the model's cells | ignored |
 //! | bearing outside ±π | taken modulo 2π |
-//! | more neighbours than fit | the nearest are kept, the others counted in [`Neighbours::dropped`] |
+//! | more neighbours than fit | the nearest are kept, the rest are counted in [`Neighbours::dropped`] |
 
 use crate::sensor::{SensorBits, SensorModel};
 use micromath::F32;

@@ -54,7 +54,7 @@ impl Template {
     }
 }
 
-/// Sensors of model C that the line sets.
+/// Sensors of model C that the line template sets.
 const LINE_C: u16 = bits_at(&[0, 3, 8, 11]);
 
 /// Returns a word with the bits of the given sensors set.

@@ -848,7 +848,7 @@ fn refuses_numbers_of_weights_that_do_not_fit() {
     fields.weights.push(0);
     refused(&fields);
 
-    // Half a weight too many.
+    // Appends half a weight.
     let mut weights = right.weight_bytes();
     weights.push(0);
     assert_refused(

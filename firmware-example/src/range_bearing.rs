@@ -35,8 +35,8 @@ impl RangeBearing {
         }
     }
 
-    /// Takes a byte. If the byte completes a scan, replaces `neighbours` with the neighbours found
-    /// by the scan and returns true.
+    /// Processes a byte. If the byte completes a scan, replaces `neighbours` with the neighbours
+    /// found by the scan and returns true.
     pub fn feed<const N: usize>(&mut self, byte: u8, neighbours: &mut Neighbours<N>) -> bool {
         if !self.decoder.feed(byte) {
             return false;

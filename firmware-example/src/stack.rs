@@ -16,7 +16,7 @@ const PAINT: u32 = 0x7a7a_a5a5;
 /// Returns the number of stack bytes, up to [`DEPTH_MAX`], that are used by `work` and the
 /// functions it calls. No interrupt may occur.
 ///
-/// The deepest word that was written counts; a frame may extend deeper without using it.
+/// The measured depth ends at the deepest word written; a frame may extend deeper without using it.
 #[inline(never)]
 pub fn depth(work: &mut dyn FnMut()) -> u32 {
     let top = msp::read() & !3;

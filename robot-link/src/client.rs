@@ -66,7 +66,7 @@ pub enum RequestError {
     SessionExhausted,
 }
 
-/// Error for a robot that has not replied. It may or may not have executed the request.
+/// Error if the robot has not replied. The robot may or may not have executed the request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no reply to a request sent {attempts} times")]
 pub struct GaveUp {
@@ -134,7 +134,7 @@ impl Client {
         Ok(self.frame())
     }
 
-    /// Takes one byte from the line. If the byte completes the reply to the pending request,
+    /// Processes one byte from the line. If the byte completes the reply to the pending request,
     /// returns the reply. Everything else that arrives is counted and discarded.
     pub fn feed(&mut self, byte: u8) -> Option<Reply<'_>> {
         if !self.decoder.feed(byte) {

@@ -81,8 +81,8 @@ impl Decoder {
         }
     }
 
-    /// Takes one byte; returns true if the byte completes a frame with a correct CRC. The message
-    /// is in [`Decoder::payload`] until the next byte is fed.
+    /// Processes one byte; returns true if the byte completes a frame with a correct CRC. The
+    /// message is in [`Decoder::payload`] until the next byte is fed.
     pub fn feed(&mut self, byte: u8) -> bool {
         if self.complete {
             self.start_over();

@@ -64,8 +64,8 @@ pub trait Handler {
     fn telemetry(&mut self) -> Report;
 }
 
-/// The robot's end of the line: takes bytes, returns bytes, and ensures that every request is
-/// executed once.
+/// The robot's end of the line: processes received bytes, returns bytes to send, and ensures that
+/// every request is executed once.
 ///
 /// ```
 /// use minimal_surprise_link::{Client, Request, Server};
@@ -99,7 +99,7 @@ struct Conversation {
     session: Option<u32>,
     /// The previous session, which cannot be reopened.
     session_before: Option<u32>,
-    /// The last request carried out: its number and the CRC of its frame.
+    /// The last request executed: its number and the CRC of its frame.
     last: (u32, u32),
     /// The reply to the last request, as sent.
     reply: Wire<WIRE_BYTES_MAX>,
@@ -145,8 +145,8 @@ impl Server {
         }
     }
 
-    /// Takes one byte from the line. If the byte completes a request, executes it and returns the
-    /// bytes to send.
+    /// Processes one byte from the line. If the byte completes a request, executes it and returns
+    /// the bytes to send.
     pub fn feed(&mut self, byte: u8, handler: &mut impl Handler) -> Option<&[u8]> {
         if !self.decoder.feed(byte) {
             return None;

@@ -435,9 +435,9 @@ fn of_two_genomes_with_equal_write_counts_the_first_slots_is_used() {
 /// Ways in which a chip mishandles a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Treatment {
-    /// Reports success but has written nothing.
+    /// Reports success but writes nothing.
     Forgets,
-    /// Has written everything but reports an error.
+    /// Writes all bytes but reports an error.
     Misreports,
 }
 

@@ -1,8 +1,8 @@
 //! Prints the cost of the controller: instructions, memory and stack. Each line is a key of
 //! `budget.toml` and the maximum value measured.
 //!
-//! Runs under QEMU with `-icount`. The values depend on the compiler, so there is no file with the
-//! expected output; the test `budget` compares them with `budget.toml`.
+//! Runs under QEMU with `-icount`. The values depend on the compiler, so the expected
+//! output is not stored; the test `budget` compares them with `budget.toml`.
 //!
 //! Uses `unsafe` for assembler that starts the clock before any other code.
 #![no_std]

@@ -1,7 +1,7 @@
 //! Prints the number of instructions of a layer of activations and of a control step.
 //!
-//! Runs under QEMU with `-icount`. The counts depend on the compiler, so there is no file with the
-//! expected output.
+//! Runs under QEMU with `-icount`. The counts depend on the compiler, so the expected
+//! output is not stored.
 #![no_std]
 #![no_main]
 

@@ -14,11 +14,11 @@ const NOT_ASKED: Entry = 1;
 
 /// Number of bits that an entry is shifted by when it is added to a robot word.
 pub(super) const ENTRY_SHIFT: u32 = 24;
-/// Entry of a quarter turn to the left.
+/// Entry for a quarter turn to the left.
 pub(super) const TURN_LEFT: Entry = to_entry(Action::Turn, Turn::CounterClockwise);
-/// Entry of a quarter turn to the right.
+/// Entry for a quarter turn to the right.
 pub(super) const TURN_RIGHT: Entry = to_entry(Action::Turn, Turn::Clockwise);
-/// Entry of going straight.
+/// Entry for going straight.
 pub(super) const STRAIGHT: Entry = to_entry(Action::Straight, Turn::Clockwise);
 
 const fn to_entry(action: Action, turn: Turn) -> Entry {

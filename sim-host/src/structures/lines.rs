@@ -171,7 +171,7 @@ pub(super) fn find(field: &Field) -> Vec<Line> {
                 add(&run, false);
             }
         }
-        // A run in which no robot is first goes around the torus.
+        // A run without a first robot goes around the torus.
         for first in field.row_by_row().filter(on_axis) {
             if !seen[first as usize] {
                 follow(field, axis, first, &mut seen, &mut run);

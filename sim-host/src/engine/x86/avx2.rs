@@ -10,7 +10,7 @@ use minimal_surprise_controller::fixed::FRACTION_BITS;
 const TABLE_BITS: usize = 3;
 /// Number of tables of a hidden neuron.
 const TABLES: usize = 5;
-/// Number of robots at once.
+/// Number of robots processed at once.
 const HALF: usize = 16;
 
 /// A prediction network laid out for [`run_block`].

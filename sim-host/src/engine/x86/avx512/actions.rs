@@ -10,7 +10,7 @@ use minimal_surprise_controller::Controller;
 
 /// Maximum number of hidden neurons of an action network.
 const HIDDEN: usize = 8;
-/// Number of windows at once.
+/// Number of windows processed at once.
 const BATCH: usize = 32;
 
 /// Fills the entries of all windows.
