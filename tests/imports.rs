@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const CRATES: [&str; 5] = [
+const CRATES: [&str; 7] = [
+    "controller",
+    "sim-host",
     "robot-slots",
     "robot-link",
     "evolution",

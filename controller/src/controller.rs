@@ -1,8 +1,9 @@
 //! The controller of one robot: immutable weights, a small state, and one step.
 
 use crate::codec::EncodedGenome;
+use crate::fixed::Aligned;
 use crate::genome::Genome;
-use crate::network::{ActionNetwork, Aligned, MAX_HIDDEN, PredictionNetwork};
+use crate::network::{ActionNetwork, MAX_HIDDEN, PredictionNetwork};
 use crate::sensor::SensorBits;
 use crate::topology::Topology;
 use serde::{Deserialize, Serialize};

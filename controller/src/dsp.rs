@@ -8,8 +8,7 @@
 #![allow(unsafe_code)]
 
 use crate::activation::{ROWS, SEGMENT_SCALE};
-use crate::fixed::{FRACTION_BITS, MAX_TERMS, ROUNDING_Q24};
-use crate::network::Aligned;
+use crate::fixed::{Aligned, FRACTION_BITS, MAX_TERMS, ROUNDING_Q24};
 use core::arch::asm;
 
 /// Replaces the first `count` values with their activations, with the same order of operations as

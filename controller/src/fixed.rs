@@ -26,6 +26,12 @@ const _: () = assert!(
         <= i32::MAX as i64
 );
 
+/// A word-aligned array, so that several weights can be loaded at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(C, align(4))]
+pub(crate) struct Aligned<T>(pub(crate) T);
+
 /// Saturates a value to the range of `i16`.
 #[inline]
 #[must_use]

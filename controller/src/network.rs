@@ -12,7 +12,7 @@
 //! it has one; output rows.
 
 use crate::activation::activate;
-use crate::fixed::{FRACTION_BITS, MAX_TERMS, ONE_Q3_12, saturate};
+use crate::fixed::{Aligned, FRACTION_BITS, MAX_TERMS, ONE_Q3_12, saturate};
 #[cfg(not(has_smlad))]
 use crate::fixed::{ROUNDING_Q24, sum_to_q3_12};
 
@@ -164,12 +164,6 @@ pub struct Network<const H: usize, const O: usize> {
     hidden: Aligned<[[i16; MAX_TERMS]; H]>,
     output: Aligned<[[i16; H]; O]>,
 }
-
-/// A word-aligned array, so that several weights can be loaded at once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[repr(C, align(4))]
-pub(crate) struct Aligned<T>(pub(crate) T);
 
 /// The action network of any topology.
 pub type ActionNetwork = Network<8, 2>;

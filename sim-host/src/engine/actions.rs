@@ -2,35 +2,12 @@
 //! repetitions of a genome.
 
 use super::path::EnginePath;
-use super::robot_word::{ACTION, HEADING_SHIFT};
+use super::robot_word::{ENTRY_SHIFT, Entry, to_entry};
 use super::window::{WINDOWS, WindowOrder};
-use minimal_surprise_controller::{Action, Controller, Turn};
+use minimal_surprise_controller::Controller;
 
-/// An action as the top byte of the addend for a robot word: bit 7 is the action, bits 5 and 6 are
-/// the turn (0, 1 or 3 quarter turns), and bit 0 is set until the entry is computed.
-type Entry = u8;
-
+/// An entry that is not computed yet.
 const NOT_ASKED: Entry = 1;
-
-/// Number of bits that an entry is shifted by when it is added to a robot word.
-pub(super) const ENTRY_SHIFT: u32 = 24;
-/// Entry for a quarter turn to the left.
-pub(super) const TURN_LEFT: Entry = to_entry(Action::Turn, Turn::CounterClockwise);
-/// Entry for a quarter turn to the right.
-pub(super) const TURN_RIGHT: Entry = to_entry(Action::Turn, Turn::Clockwise);
-/// Entry for going straight.
-pub(super) const STRAIGHT: Entry = to_entry(Action::Straight, Turn::Clockwise);
-
-const fn to_entry(action: Action, turn: Turn) -> Entry {
-    let quarters: u32 = match turn {
-        Turn::CounterClockwise => 1,
-        Turn::Clockwise => 3,
-    };
-    match action {
-        Action::Straight => 0,
-        Action::Turn => ((ACTION | quarters << HEADING_SHIFT) >> ENTRY_SHIFT) as Entry,
-    }
-}
 
 /// The actions of one action network, each computed on first use or all at once.
 #[derive(Clone, Debug)]

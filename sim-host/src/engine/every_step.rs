@@ -1,7 +1,8 @@
 //! Predictions step by step, for noisy swarms and for swarms too large to record as a whole: robots
 //! stay in their lanes, and recordings are processed part by part.
 
-use super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, Predictor};
+use super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches};
+use super::predictor::Predictor;
 use super::recording::Recording;
 
 /// The robots of some repetitions in groups of 32; the last group may be incomplete.

@@ -34,6 +34,7 @@ mod lanes;
 mod network;
 mod path;
 mod portable;
+mod predictor;
 mod recording;
 mod repeats;
 mod robot_word;

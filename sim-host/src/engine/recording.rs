@@ -7,7 +7,8 @@ use super::flips::FlipSource;
 use super::lanes::BLOCK_STEPS;
 use super::path::EnginePath;
 use super::repeats::History;
-use super::swarm::{Behaviour, ROBOTS_AT_ONCE, Swarm};
+use super::robot_word::ROBOTS_AT_ONCE;
+use super::swarm::{Behaviour, Swarm};
 
 /// The inputs of a number of robots over a number of blocks.
 #[derive(Clone, Debug, Default)]

@@ -12,6 +12,7 @@
 //! in the same step. Two swarms are in the same state if and only if their words are equal.
 
 use crate::torus::{Heading, Pose};
+use minimal_surprise_controller::{Action, Turn};
 
 const COORDINATE_BITS: u32 = 14;
 const COORDINATE: u32 = (1 << COORDINATE_BITS) - 1;
@@ -23,6 +24,33 @@ pub(super) const HEADING_SHIFT: u32 = 29;
 pub(super) const ACTION: u32 = 1 << 31;
 
 const _: () = assert!(crate::torus::SIDE_MAX == 1 << COORDINATE_BITS);
+
+/// Robot words are padded to a multiple of this number.
+pub(super) const ROBOTS_AT_ONCE: usize = 16;
+
+/// An action as the top byte of the addend for a robot word: bit 7 is the action, bits 5 and 6 are
+/// the turn (0, 1 or 3 quarter turns), and bit 0 is set until the entry is computed.
+pub(super) type Entry = u8;
+
+/// Number of bits that an entry is shifted by when it is added to a robot word.
+pub(super) const ENTRY_SHIFT: u32 = 24;
+/// Entry for a quarter turn to the left.
+pub(super) const TURN_LEFT: Entry = to_entry(Action::Turn, Turn::CounterClockwise);
+/// Entry for a quarter turn to the right.
+pub(super) const TURN_RIGHT: Entry = to_entry(Action::Turn, Turn::Clockwise);
+/// Entry for going straight.
+pub(super) const STRAIGHT: Entry = to_entry(Action::Straight, Turn::Clockwise);
+
+pub(super) const fn to_entry(action: Action, turn: Turn) -> Entry {
+    let quarters: u32 = match turn {
+        Turn::CounterClockwise => 1,
+        Turn::Clockwise => 3,
+    };
+    match action {
+        Action::Straight => 0,
+        Action::Turn => ((ACTION | quarters << HEADING_SHIFT) >> ENTRY_SHIFT) as Entry,
+    }
+}
 
 /// Returns the word of a robot before its first step.
 pub(super) fn from_pose(pose: Pose) -> u32 {

@@ -5,7 +5,8 @@
 //! many matching bits as the last one. Each lane has its own position in the recording of its
 //! robot, skips independently, and takes the next robot when its recording is complete.
 
-use super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches, Predictor};
+use super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches};
+use super::predictor::Predictor;
 use super::recording::Recording;
 
 /// Counts the matches of every recorded robot and passes them to `add`.

@@ -6,15 +6,12 @@
 use super::actions::ActionTable;
 use super::board::Board;
 use super::path::EnginePath;
-use super::robot_word::{self, ACTION};
+use super::robot_word::{self, ACTION, ROBOTS_AT_ONCE};
 use super::window::{ACTION_BIT, AHEAD_BIT, WindowOrder};
 #[cfg(target_arch = "x86_64")]
 use super::x86;
 use crate::torus::{Grid, Pose};
 use minimal_surprise_controller::Controller;
-
-/// Robot words are padded to a multiple of this number.
-pub(super) const ROBOTS_AT_ONCE: usize = 16;
 
 /// The behaviour of a genome, shared by all swarms of an evaluation.
 pub(super) struct Behaviour<'a> {

@@ -323,7 +323,10 @@ mod tests {
             .filter(|f| f.extension() == Some("svg".as_ref()))
         {
             let svg = std::fs::read_to_string(svg).unwrap();
-            assert!(svg.contains("fill=\"#ffffff\""), "a figure is dark on white");
+            assert!(
+                svg.contains("fill=\"#ffffff\""),
+                "a figure is dark on white"
+            );
         }
         for again in ["| again | two: ", "| damage | two: "] {
             assert!(markdown.contains(again), "{again} is made, too");

@@ -1,8 +1,8 @@
 //! The whole action table, 32 windows at once: the windows of a batch differ only in their lowest
 //! five bits, so the rest of each hidden sum is constant.
 
-use super::super::super::actions::{STRAIGHT, TURN_LEFT, TURN_RIGHT};
 use super::super::super::network::HiddenSum;
+use super::super::super::robot_word::{STRAIGHT, TURN_LEFT, TURN_RIGHT};
 use super::super::super::window::{WINDOWS, WindowOrder};
 use super::activation::Activation;
 use core::arch::x86_64::*;

@@ -4,10 +4,10 @@
 //! fetches each robot's lines; on wider boards, gathers fetch them. Then the three lines are
 //! rotated so that the robot's cells are at their window bits, and merged.
 
-use super::super::super::actions::ENTRY_SHIFT;
 use super::super::super::board::{Board, Plane};
-use super::super::super::robot_word::{ACTION, HEADING_SHIFT, POSITION};
-use super::super::super::swarm::ROBOTS_AT_ONCE;
+use super::super::super::robot_word::{
+    ACTION, ENTRY_SHIFT, HEADING_SHIFT, POSITION, ROBOTS_AT_ONCE,
+};
 use super::super::super::window::{ACTION_BIT, AHEAD_BIT, ROW_BITS, WINDOWS};
 use super::super::Sensing;
 use core::arch::x86_64::*;
