@@ -1,4 +1,4 @@
-//! Notes the revision and the compiler that a program was built from and with, for `meta.json`.
+//! Records the source revision and the compiler version of the program, for `meta.json`.
 
 use std::path::Path;
 use std::process::Command;
@@ -6,7 +6,7 @@ use std::process::Command;
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     for file in ["HEAD", "logs/HEAD"] {
-        // What is missing would count as changed in every build.
+        // Cargo treats a missing file as changed in every build.
         let path = first_line("git", &["rev-parse", "--git-path", file]);
         if let Some(path) = path.filter(|path| Path::new(path).exists()) {
             println!("cargo:rerun-if-changed={path}");

@@ -647,7 +647,7 @@ fn export_refuses_invalid_genomes_and_places_where_they_do_not_fit() {
     );
     refused(
         "export run/best.genome --format bin --address flash --out out",
-        &["--address = flash", "as in 0x080e0000"],
+        &["--address = flash", "such as 0x080e0000"],
     );
     refused(
         "export run/best.genome --format slot --write-count 0 --out out",

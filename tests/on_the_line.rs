@@ -362,7 +362,7 @@ fn another_device_is_refused() {
         let length = minimal_surprise_link::encode(&message, &mut wire).unwrap();
         Answer::Bytes(wire[..length].to_vec())
     });
-    another(&newer, "speaks version 2 of the protocol");
+    another(&newer, "uses version 2 of the protocol");
 }
 
 #[test]
@@ -467,7 +467,7 @@ fn after_a_refusal_halfway_the_robot_is_restored() {
             let genome = if command == "flash" { "new" } else { "old" };
             let genome = format!("{genome}.genome");
             let run = evolver.run(&[command, &genome, "--port", &robot.device.port]);
-            let words = format!("refused while the robot was {doing}");
+            let words = format!("request rejected while the robot was {doing}");
             assert_failed(&run, &[&words, &refusal.to_string()]);
             let kept = match (command, refusal) {
                 ("hil", _) => "",

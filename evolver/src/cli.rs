@@ -23,7 +23,7 @@ use clap::{ColorChoice, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Evolves swarms of robots that minimise surprise, with exactly the arithmetic of the robots.
+/// Evolves swarms of robots that minimise surprise, with exactly the robots' integer arithmetic.
 ///
 /// Without a command: `evolve` with the paper's parameters.
 #[derive(Debug, Parser)]
@@ -37,13 +37,13 @@ struct Cli {
 enum Command {
     /// Evolve a swarm; write its genome and the record of the run to a directory.
     Evolve(Box<EvolveArgs>),
-    /// Measure how fast this program is on this machine; takes less than a minute.
+    /// Measure the speed of this program on this machine; takes less than a minute.
     Bench {
         /// Print JSON.
         #[arg(long)]
         json: bool,
     },
-    /// Classify what a swarm formed, show which robots belong to it, and measure the run.
+    /// Classify the structure that a swarm formed, show its robots, and measure the run.
     Classify {
         /// A run directory, a final.json, an agent_trajectory, or a drawing of ▶ ▲ ◀ ▼ and ·.
         state: PathBuf,
@@ -55,15 +55,16 @@ enum Command {
     Replay(Box<ReplayArgs>),
     /// Write a page with the final state of every run, linked to their replays.
     Gallery(GalleryArgs),
-    /// Re-evaluate a genome from new starts, on other grids, with other noise and swarm sizes.
+    /// Re-evaluate a genome from new starts, optionally with different grids, noise and swarm
+    /// sizes.
     Evaluate(EvaluateArgs),
-    /// Remove or reposition robots of a structure, and see how the swarm recovers.
+    /// Remove or reposition robots of a structure, and measure the swarm's recovery.
     Damage(DamageArgs),
     /// Export a run or a genome to the format of another program.
     Export(ExportArgs),
     /// Write a genome to the robot on a serial port, and start the robot.
     Flash(FlashArgs),
-    /// Show what the robot on a serial port does, and how surprised it is, until Ctrl-C.
+    /// Show the motion and surprise of the robot on a serial port until Ctrl-C.
     Monitor(MonitorArgs),
     /// Start the robot on a serial port with its current genome.
     Start(PortArgs),
@@ -86,7 +87,7 @@ enum Command {
     },
     /// Run your own suite of experiments, described in a TOML file.
     Suite(SuiteArgs),
-    /// Do a share of a suite's runs: one task of a cluster or of GNU parallel.
+    /// Execute part of a suite's runs, as one cluster or GNU parallel task.
     RunTask(TaskArgs),
     /// Print a completion script for a shell.
     Completions {
@@ -106,7 +107,7 @@ pub fn main() -> ExitCode {
     exit.into()
 }
 
-/// The arguments; exits if they are invalid or ask for help.
+/// Parses the arguments; exits if they are invalid or request help.
 fn arguments() -> Cli {
     let colours = match output::terminal_has_codes() {
         true => ColorChoice::Auto,

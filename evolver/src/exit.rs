@@ -1,17 +1,17 @@
-//! How the program ends; for users, see `docs/exit-codes.md`.
+//! Exit codes; documented for users in `docs/exit-codes.md`.
 
 use std::process::ExitCode;
 
 /// The exit codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
-    /// Everything asked for is done.
+    /// All requested work is done.
     Done = 0,
     /// Something failed: a file, a disk, a robot, a damaged run.
     Failure = 1,
     /// The input is invalid; nothing was written.
     BadInput = 2,
-    /// Not everything asked for is done; nothing is lost, and the printed command continues.
+    /// Some of the requested work is not done; nothing is lost, and the printed command continues.
     Unfinished = 3,
     /// Ended by Ctrl-C or another signal; nothing is lost.
     Interrupted = 130,

@@ -48,13 +48,13 @@ impl fmt::Display for HilHash {
     }
 }
 
-/// A run with a real robot ended early.
+/// The error that ended a run with a real robot early.
 #[derive(Debug, thiserror::Error)]
 pub enum HilError<E> {
-    /// The starting poses do not fit the grid.
+    /// Starting poses that do not fit the grid.
     #[error(transparent)]
     World(WorldError),
-    /// The robot did not step.
+    /// Failure of the robot to make a step.
     #[error(transparent)]
     Robot(E),
 }
@@ -79,7 +79,7 @@ impl HilTrial {
     /// Runs the swarm with a real robot 0: `step` sends it a reading and returns its decision.
     ///
     /// # Errors
-    /// [`HilError`].
+    /// [`HilError`] if the starting poses do not fit the grid or `step` fails.
     pub fn with_robot<E>(
         &self,
         mut step: impl FnMut(SensorBits) -> Result<Stepped, E>,
@@ -96,7 +96,7 @@ impl HilTrial {
                     surprise = stepped.surprise;
                     stepped.decision
                 });
-                // The world requires a decision even now; this step is the last.
+                // The world requires a decision even after a failure; this step is the last.
                 let own = own.unwrap_or_else(|error| {
                     failed = Some(error);
                     Decision {
@@ -123,7 +123,7 @@ impl HilTrial {
 }
 
 impl HilRun {
-    /// The first step, counted from 1, in which robot 0's decisions differ.
+    /// Returns the first step, counted from 1, in which robot 0's decisions differ.
     #[must_use]
     pub fn first_difference(&self, there: &Self) -> Option<usize> {
         let pairs = self.decisions.iter().zip(&there.decisions);

@@ -1,10 +1,8 @@
-//! All output to standard output and standard error.
-//!
-//! The reader may close the pipe, and the disk may be full. A report without a reader ends quietly:
-//! `evolver classify RUN | head` is not an error. Work continues to a point from which it can be
-//! resumed ([`event`]). What cannot be written to standard error is dropped.
-//!
-//! Files and pipes get UTF-8; a terminal gets what its locale supports.
+//! All output to standard output and standard error. The reader may close the pipe, and the disk
+//! may be full. Writing a report to a closed pipe is not an error, as in `evolver classify RUN |
+//! head`. Long work stops at a point from which it can be resumed ([`event`]). Failures to write to
+//! standard error are ignored. Files and pipes receive UTF-8; a terminal receives ASCII if its
+//! locale does not support UTF-8.
 
 use crate::exit::Exit;
 use crate::signals;
@@ -15,15 +13,15 @@ use std::fmt::Arguments;
 use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::sync::{LazyLock, OnceLock};
 
-/// Checked once, at the start: a terminal that is closed later no longer counts as one.
+/// Whether standard output is a terminal; checked at the start, since it may be closed later.
 static STDOUT_IS_TERMINAL: LazyLock<bool> = LazyLock::new(|| stdout().is_terminal());
 static STDERR_IS_TERMINAL: LazyLock<bool> = LazyLock::new(|| stderr().is_terminal());
 static LOCALE_IS_UTF8: LazyLock<bool> = LazyLock::new(locale_is_utf8);
 
-/// Why an event could not be written.
+/// The error that prevented writing an event.
 static LOST: OnceLock<io::Error> = OnceLock::new();
 
-/// Inspects the terminals, and disables colours where they are not supported.
+/// Inspects the terminals, and disables colours if they are not supported.
 pub(crate) fn start() {
     LazyLock::force(&STDOUT_IS_TERMINAL);
     LazyLock::force(&STDERR_IS_TERMINAL);
@@ -66,7 +64,7 @@ fn locale_is_utf8() -> bool {
     cfg!(windows) || locale.contains("utf-8") || locale.contains("utf8")
 }
 
-/// The text as standard error can show it.
+/// Returns the text in the characters that standard error can display.
 pub(crate) fn for_stderr(text: &str) -> Cow<'_, str> {
     if stderr_is_ascii() {
         ascii(text).into()
@@ -98,8 +96,8 @@ pub(crate) fn write_bytes(bytes: &[u8]) {
     check(written);
 }
 
-/// Exits if a report could not be written. A report whose reader is gone is dropped: the exit code
-/// still tells the result.
+/// Exits if a report could not be written. Output to a closed pipe is discarded; the exit code
+/// still reports the result.
 pub(crate) fn check(written: io::Result<()>) {
     match written {
         Err(error) if !is_gone(&error) => {
@@ -110,29 +108,30 @@ pub(crate) fn check(written: io::Result<()>) {
     }
 }
 
-/// Writes to standard output during work that takes long. If that fails, the work is asked to stop
-/// where it can be resumed, and [`lost`] returns the reason.
+/// Writes to standard output during long work. If that fails, asks the work to stop at a point from
+/// which it can be resumed; [`lost`] then returns the error.
 pub(crate) fn event(text: Arguments<'_>) {
     if let Err(error) = try_write(text) {
-        // The first error is kept.
+        // Keep the first error.
         let _ = LOST.set(error);
         signals::ask_to_stop();
     }
 }
 
-/// Why the work was asked to stop, if writing to standard output failed.
+/// Returns the error if work was asked to stop because writing to standard output failed.
 pub(crate) fn lost() -> Option<&'static io::Error> {
     LOST.get()
 }
 
-/// Returns whether the reader of standard output is gone; for a terminal, any error means that.
+/// Returns whether standard output was closed by its reader; on a terminal, any error means that.
 pub(crate) fn is_gone(error: &io::Error) -> bool {
     error.kind() == ErrorKind::BrokenPipe || *STDOUT_IS_TERMINAL
 }
 
-/// Writes to standard error. Errors are ignored: there is nowhere to report them.
+/// Writes to standard error. Ignores errors, since they cannot be reported.
 pub(crate) fn tell(text: Arguments<'_>) {
-    // In one write, since other processes write there, too. Names and paths may contain anything.
+    // Use a single write, since other processes write to standard error too. Escape control
+    // characters, which names and paths may contain.
     let text = terminal_lines(&text.to_string());
     let _ = stderr().write_all(for_stderr(&text).as_bytes());
 }
@@ -147,7 +146,7 @@ macro_rules! show_line {
     ($($text:tt)*) => { $crate::output::write(format_args!("{}\n", format_args!($($text)*))) };
 }
 
-/// Writes a line to standard output during work that takes long.
+/// Writes a line to standard output during long work.
 macro_rules! show_event {
     ($($text:tt)*) => { $crate::output::event(format_args!("{}\n", format_args!($($text)*))) };
 }

@@ -1,9 +1,9 @@
-//! This program, as recorded in its runs.
+//! Description of this program, for `meta.json`.
 
 use minimal_surprise_evolution::run_files::Program;
 use minimal_surprise_evolution::text::shell_word;
 
-/// Name, version, revision, compiler, and command line.
+/// Returns the program's name, version, revision, compiler, and command line.
 #[must_use]
 pub fn this_program() -> Program {
     let arguments = std::env::args_os();

@@ -1,5 +1,6 @@
-//! Signals that request an end. Signals that the caller ignores stay ignored: a run under `nohup`
-//! outlives its terminal, and Ctrl-C does not reach a script's background jobs.
+//! Signals that request an exit. Signals ignored by the parent process stay ignored: a run under
+//! `nohup` survives the closing of its terminal, and Ctrl-C does not stop a script's background
+//! jobs.
 
 use crate::exit::Exit;
 use signal_hook::{consts, flag};
@@ -9,26 +10,26 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Signals that request an end.
+/// Signals that request an exit.
 #[cfg(unix)]
 const SIGNALS: [i32; 3] = [consts::SIGINT, consts::SIGTERM, consts::SIGHUP];
 #[cfg(not(unix))]
 const SIGNALS: [i32; 2] = [consts::SIGINT, consts::SIGTERM];
 
-/// How often signals are checked. Signals within this time, such as from a terminal and its shell,
-/// count as one.
+/// Interval between checks for signals. Signals within one interval, such as from a terminal and
+/// its shell, count as one.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Whether work should stop where it can be resumed.
+/// Whether work should stop at a point from which it can be resumed.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// Returns whether work should stop where it can be resumed.
+/// Returns the flag that asks work to stop at a point from which it can be resumed.
 #[must_use]
 pub fn stop() -> &'static AtomicBool {
     &STOP
 }
 
-/// Asks work to stop where it can be resumed.
+/// Asks work to stop at a point from which it can be resumed.
 pub fn ask_to_stop() {
     STOP.store(true, Ordering::Relaxed);
 }
@@ -44,20 +45,21 @@ pub fn wait_until(moment: Instant) {
     }
 }
 
-/// The first signal asks work to stop after this generation, the second exits at once; either way
-/// the run can be resumed.
+/// Installs signal handling: the first signal asks work to stop after this generation, the second
+/// exits immediately. In both cases the run can be resumed.
 ///
 /// # Errors
-/// If the operating system does not deliver signals.
+/// If the signal handlers cannot be installed.
 pub fn stop_on_signal() -> io::Result<&'static AtomicBool> {
     ask_then_end("ending after this generation", || {})?;
     Ok(stop())
 }
 
-/// The first signal asks work to stop and prints `words`, the second calls `last` and exits.
+/// Installs signal handling: the first signal prints `words` and asks work to stop, the second
+/// calls `last` and exits.
 ///
 /// # Errors
-/// If the operating system does not deliver signals.
+/// If the signal handlers cannot be installed.
 pub fn ask_then_end(words: &'static str, last: impl Fn() + Send + 'static) -> io::Result<()> {
     let mut asked = false;
     on_signal(move || {
@@ -71,10 +73,10 @@ pub fn ask_then_end(words: &'static str, last: impl Fn() + Send + 'static) -> io
     })
 }
 
-/// Calls `handle` on a separate thread for every signal that requests an end.
+/// Calls `handle` on a separate thread for every signal that requests an exit.
 ///
 /// # Errors
-/// If the operating system does not deliver signals.
+/// If the signal handlers cannot be installed.
 pub fn on_signal(mut handle: impl FnMut() + Send + 'static) -> io::Result<()> {
     let came = Arc::new(AtomicBool::new(false));
     let ignored = ignored();
@@ -95,8 +97,8 @@ pub fn on_signal(mut handle: impl FnMut() + Send + 'static) -> io::Result<()> {
     Ok(())
 }
 
-/// The signals that this process ignores, bit n − 1 for signal n; none where the system has no file
-/// that lists them.
+/// Returns the signals that this process ignores, bit n − 1 for signal n; 0 if the operating system
+/// does not list them in `/proc`.
 fn ignored() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

@@ -1,18 +1,16 @@
-//! The baseline: the same model as a straightforward program in `f32`.
-//!
-//! tanh is the standard library's; input activations are computed once per genome, hidden ones
-//! once per step. The world is the plain one. Its results differ from the integer ones only through
-//! rounding.
+//! The baseline: a straightforward `f32` program of the same model. It uses tanh of the standard
+//! library, and computes input activations once per genome and hidden activations once per step. It
+//! runs in the plain world. Its results differ from the integer results only through rounding.
 
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{Action, Decision, Genome, SensorBits, Turn};
 
-/// One network.
+/// A network with `f32` weights.
 struct Network {
     shape: Shape,
-    /// Activation of each input for a bit of 0 and of 1.
+    /// Activation of each input for bit values 0 and 1.
     input: Vec<[f32; 2]>,
-    /// Rows of input weights and, if there is one, the self-loop.
+    /// Rows of input weights, each followed by the self-loop weight if the network is recurrent.
     hidden: Vec<f32>,
     output: Vec<f32>,
 }
@@ -33,7 +31,7 @@ impl Network {
         }
     }
 
-    /// Bit k of the result is set if output k is not negative.
+    /// Computes the outputs; bit k of the result is set if output k is not negative.
     fn forward(&self, inputs: u16, hidden: &mut [f32]) -> u16 {
         let row = self.shape.hidden_row();
         for (value, weights) in hidden.iter_mut().zip(self.hidden.chunks(row)) {
@@ -80,7 +78,7 @@ impl Networks {
     }
 }
 
-/// The memory of all robots of a swarm.
+/// The states of all robots of a swarm.
 pub struct Robots {
     hidden: Vec<Vec<f32>>,
     actions: Vec<Action>,
@@ -89,7 +87,7 @@ pub struct Robots {
 }
 
 impl Robots {
-    /// A swarm at the start of a run.
+    /// Creates the states at the start of a run.
     #[must_use]
     pub fn new(networks: &Networks, robots: usize) -> Self {
         Self {
@@ -134,7 +132,7 @@ impl Robots {
         decisions
     }
 
-    /// Bits predicted correctly so far.
+    /// Returns the number of bits predicted correctly so far.
     #[must_use]
     pub fn matches(&self) -> u64 {
         self.matches

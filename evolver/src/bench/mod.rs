@@ -1,8 +1,7 @@
-//! Benchmarks, reported as speed ratios within one run.
-//!
-//! Everything is timed on early, middle and late populations of real evolutions ([`populations`]),
-//! in robot-steps per CPU-second on one thread. The baseline is a straightforward floating-point
-//! program of the same model ([`f32_program`]).
+//! Benchmarks, reported as speed ratios within one run. All speeds are measured on early, middle
+//! and late populations of real evolutions ([`populations`]), in robot-steps per CPU-second on one
+//! thread. The baseline is a straightforward floating-point program of the same model
+//! ([`f32_program`]).
 
 pub mod f32_program;
 pub mod populations;
@@ -42,15 +41,15 @@ pub struct Report {
 /// Repetitions and steps of an evaluation, as in the paper.
 const REPETITIONS: u32 = 10;
 const STEPS: u32 = 500;
-/// Sensor noise for the speed with noise.
+/// Sensor noise in the measurement with noise.
 const NOISE: f64 = 0.1;
-/// Shortest time over which a speed is measured, in CPU-seconds.
+/// Minimum duration of a measurement, in CPU-seconds.
 const SECONDS_MIN: f64 = 1.5;
 
-/// Measures everything; calls `say` with the name of each measurement.
+/// Runs all measurements; calls `say` with the name of each.
 ///
 /// # Errors
-/// If this program cannot be started as a child to measure whole evolutions.
+/// If this program cannot be started as a child process to measure complete evolutions.
 pub fn run(path: EnginePath, mut say: impl FnMut(&str)) -> io::Result<Report> {
     let on_15 = populations::c_15x15();
     let on_20 = populations::c_20x20();
@@ -58,7 +57,8 @@ pub fn run(path: EnginePath, mut say: impl FnMut(&str)) -> io::Result<Report> {
     let quiet = trials(15, 0.0);
     let fast = |skips| Evaluator::new(Engine::Fast, path).with_repeats_skipped(skips);
 
-    // First, while this process is small: a child's memory includes its parent's at the start.
+    // Measure memory first, while this process is small: a child's memory initially includes its
+    // parent's.
     say("memory");
     let peak_rss_mb = peak_rss_mb()?;
     say("fast");
@@ -110,15 +110,15 @@ fn trials(side: u32, noise: f64) -> TrialSet {
     TrialSet::new(scenario, SensorModel::C, trials)
 }
 
-/// A few genomes of early, middle and late generations, for slow measurements.
+/// Selects a few genomes of early, middle and late generations, for slow measurements.
 fn some_of_each(genomes: &[Genome]) -> Vec<Genome> {
     genomes.iter().step_by(6).cloned().collect()
 }
 
-/// Robot-steps per CPU-second over all genomes, repeated for long enough.
+/// Measures robot-steps per CPU-second over all genomes, repeated for at least [`SECONDS_MIN`].
 fn speed(genomes: &[Genome], trials: &TrialSet, evaluator: &mut Evaluator) -> f64 {
     let steps = robot_steps(trials) * genomes.len() as f64;
-    // Once without timing: noise and memory are prepared once per generation.
+    // Run once without timing: noise and memory are prepared only once per generation.
     evaluator.evaluate(&genomes[0], trials);
     let watch = Stopwatch::start();
     for round in 1.. {
@@ -159,7 +159,7 @@ fn f32_speed(genomes: &[Genome], trials: &TrialSet) -> f64 {
     steps / watch.cpu_seconds()
 }
 
-/// Speed of a million robots for a few steps.
+/// Measures the speed with a million robots for a few steps.
 fn million_robots_speed(genome: &Genome, evaluator: &mut Evaluator) -> f64 {
     let scenario = scenario(1500, 1_000_000, 40, 0.0);
     let trial = scenario.trial(SeedTree::new(1), 0, 0);
@@ -167,7 +167,7 @@ fn million_robots_speed(genome: &Genome, evaluator: &mut Evaluator) -> f64 {
     speed(std::slice::from_ref(genome), &trials, evaluator)
 }
 
-/// Starts an evolution by this program in a temporary folder.
+/// Starts an evolution in a child process, in a temporary folder.
 fn evolution(folder: &tempfile::TempDir, name: &str, flags: &[&str]) -> io::Result<Child> {
     Command::new(std::env::current_exe()?)
         .args(["evolve", "--seed", "1", "--progress", "none", "--out"])
@@ -177,7 +177,8 @@ fn evolution(folder: &tempfile::TempDir, name: &str, flags: &[&str]) -> io::Resu
         .spawn()
 }
 
-/// Times both alternately, so that changes in the machine's speed affect both.
+/// Measures one evolution on two threads and two evolutions in parallel, alternately, so that
+/// changes in the machine's speed affect both.
 fn threads_2_efficiency() -> io::Result<f64> {
     const ROUNDS: u32 = 3;
     let folder = tempfile::tempdir()?;
@@ -198,7 +199,8 @@ fn threads_2_efficiency() -> io::Result<f64> {
     Ok(apart / 2.0 / together)
 }
 
-/// Memory of a default evolution of a few generations: it does not grow with their number.
+/// Measures the memory of a default evolution; a few generations are enough, since memory does not
+/// grow with their number.
 fn peak_rss_mb() -> io::Result<Option<f64>> {
     let folder = tempfile::tempdir()?;
     evolution(&folder, "memory", &["--generations", "10"])?.wait()?;

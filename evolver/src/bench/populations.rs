@@ -1,4 +1,4 @@
-//! The populations used for timing: 20 genomes each from generations 10, 50 and 90 of default
+//! The populations used for benchmarks: 20 genomes each from generations 10, 50 and 90 of default
 //! evolutions with seed 1, as concatenated containers.
 //!
 //! `cargo run --release --example bench_populations` generates the files.
@@ -6,19 +6,19 @@
 use minimal_surprise_controller::codec::container_length;
 use minimal_surprise_controller::{EncodedGenome, Genome};
 
-/// From an evolution on 15 × 15.
+/// Returns the population of an evolution on 15 × 15.
 #[must_use]
 pub fn c_15x15() -> Vec<Genome> {
     read(include_bytes!("populations/c-15x15.genomes"))
 }
 
-/// From an evolution on 20 × 20.
+/// Returns the population of an evolution on 20 × 20.
 #[must_use]
 pub fn c_20x20() -> Vec<Genome> {
     read(include_bytes!("populations/c-20x20.genomes"))
 }
 
-/// From an evolution on 15 × 15 with 10 % noise.
+/// Returns the population of an evolution on 15 × 15 with 10 % noise.
 #[must_use]
 pub fn c_15x15_noise() -> Vec<Genome> {
     read(include_bytes!("populations/c-15x15-noise.genomes"))

@@ -4,7 +4,7 @@ use super::BadInput;
 use crate::bench::{self, Report};
 use minimal_surprise_sim::EnginePath;
 
-/// Measures and prints the results.
+/// Measures the program's speed and prints the results.
 ///
 /// # Errors
 /// [`BadInput`] if the environment names a vector path that this processor does not support.

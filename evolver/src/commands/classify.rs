@@ -1,4 +1,4 @@
-//! `evolver classify`: what a swarm formed, and measures of the run.
+//! `evolver classify`: classifies the structure that a swarm formed, and measures the run.
 
 use super::BadInput;
 use super::errors::unusable;
@@ -14,7 +14,7 @@ use std::path::Path;
 /// Classifies a run directory, a `final.json`, an `agent_trajectory`, or a drawing.
 ///
 /// # Errors
-/// [`BadInput`] if there is nothing to classify.
+/// [`BadInput`] if the file or run cannot be read or contains no swarm.
 pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
     let (grid, poses, measures) = if path.is_dir() {
         let finished = FinishedRun::read_and_check(path).map_err(unusable)?;
@@ -41,7 +41,7 @@ pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The last state in a file, whose format is recognised by its start.
+/// Reads the last state in a file; recognises the format by the first characters.
 fn read_state(path: &Path) -> anyhow::Result<(Grid, Vec<Pose>)> {
     let bytes = files::read(path, DATA_BYTES_MAX).map_err(unusable)?;
     let text = text::decode(&bytes).map_err(|error| {

@@ -12,7 +12,7 @@ use minimal_surprise_sim::damage::{Area, Damage};
 use minimal_surprise_sim::structures::{Structure, classify};
 use std::path::PathBuf;
 
-/// What to damage, and how.
+/// Arguments of `evolver damage`.
 #[derive(Debug, Args)]
 pub struct DamageArgs {
     /// The run directory.
@@ -52,7 +52,7 @@ pub struct DamageArgs {
 /// Damages the final state of a run.
 ///
 /// # Errors
-/// [`BadInput`] names the flag, the value and the valid values.
+/// [`BadInput`] if the run or a flag is invalid; the message lists the valid values.
 pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
     let finished = FinishedRun::read_and_check(&arguments.run).map_err(unusable)?;
     let grid = finished.settings.scenario().grid();
@@ -119,6 +119,6 @@ fn structure_named(text: &str) -> Result<Structure, String> {
         .find(|structure| structure.name() == spaced)
         .ok_or_else(|| {
             let names = Structure::ALL.map(Structure::name);
-            format!("structures are {}", names.join(", "))
+            format!("expected one of: {}", names.join(", "))
         })
 }

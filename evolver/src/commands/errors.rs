@@ -1,4 +1,4 @@
-//! Which errors are whose: what the user gave cannot be used, or something broke.
+//! Errors of commands, divided into invalid input and failures.
 
 use crate::exit::Exit;
 use crate::output;
@@ -22,23 +22,23 @@ use std::io::ErrorKind;
 pub struct BadInput(String);
 
 impl BadInput {
-    /// With whatever message says what is wrong.
+    /// Creates the error with a message that describes the problem.
     pub fn new(message: impl ToString) -> Self {
         Self(message.to_string())
     }
 }
 
-/// Not all that was asked for is done; the message says how to go on.
+/// Incomplete work; the message contains the command that continues it.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Unfinished(pub(super) String);
 
-/// A signal has ended what was done with a robot; the message says what that leaves.
+/// Interruption of work with a robot; the message describes the robot's state.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Interrupted(pub(super) String);
 
-/// How the program ends after an error.
+/// Returns the exit code for an error.
 #[must_use]
 pub fn exit_of(error: &anyhow::Error) -> Exit {
     if error.is::<BadInput>() {
@@ -52,7 +52,7 @@ pub fn exit_of(error: &anyhow::Error) -> Exit {
     }
 }
 
-/// Work has stopped before it was done; reports why, and how to continue.
+/// Reports why work stopped early, and the command that continues it.
 pub(super) fn stopped(resume: &str) -> anyhow::Result<Exit> {
     match output::lost() {
         None => {
@@ -60,15 +60,15 @@ pub(super) fn stopped(resume: &str) -> anyhow::Result<Exit> {
             Ok(Exit::Interrupted)
         }
         Some(error) if output::is_gone(error) => Err(Unfinished(format!(
-            "nobody reads standard output any more, and not all is done; continue with: {resume}"
+            "standard output was closed before all work was done; continue with: {resume}"
         ))
         .into()),
         Some(error) => anyhow::bail!("standard output: {error}; continue with: {resume}"),
     }
 }
 
-/// Names the runs that were left out because they are damaged; `again` is the command that does them
-/// again.
+/// Lists the runs that were left out because they are damaged; `again` is the command that repeats
+/// them.
 pub(super) fn name_damaged(damaged: &DamagedRuns, again: Option<&str>) -> Exit {
     if damaged.is_empty() {
         return Exit::Done;
@@ -79,22 +79,22 @@ pub(super) fn name_damaged(damaged: &DamagedRuns, again: Option<&str>) -> Exit {
     }
     let again = again.map_or(String::new(), |command| {
         let directories = directories.join(" ");
-        format!("; to do them again, delete {directories}, then: {command}")
+        format!("; to repeat them, delete {directories}, then run: {command}")
     });
     tell!(
-        "{} left out: damaged, made by a different version, or not to be read{again}",
+        "{} left out: damaged, unreadable, or created by a different version{again}",
         directories.len()
     );
     Exit::Failure
 }
 
-/// Errors about something that the user named.
+/// An error about an input that the user named.
 pub(super) trait AboutInput: std::error::Error + Send + Sync + Sized + 'static {
-    /// Returns whether it should not have been named, or named otherwise; else something broke.
+    /// Returns whether the input is invalid; otherwise the error is a failure.
     fn is_bad_input(&self) -> bool;
 }
 
-/// [`BadInput`] if the user named what cannot be used; the error as it is if something broke.
+/// Converts to [`BadInput`] if the input is invalid; returns other errors unchanged.
 pub(super) fn unusable(error: impl AboutInput) -> anyhow::Error {
     if error.is_bad_input() {
         BadInput::new(error).into()
@@ -118,15 +118,14 @@ impl AboutInput for SettingError {
     }
 }
 
-/// A run that is not complete was named too early; one that is, and cannot be read, is damaged,
-/// whatever file of it is in the way.
+/// An incomplete run is bad input; a complete run with any unreadable file is damaged, a failure.
 impl AboutInput for ReadRunError {
     fn is_bad_input(&self) -> bool {
         match self {
-            // Marked complete, it lacks something else.
+            // If a file other than the mark is missing, the run is marked complete but damaged.
             Self::NotComplete { missing, .. } => *missing == DONE,
             Self::NotThere(error) => error.is_bad_input(),
-            // The mark is looked for first; a directory or a pipe in its place is damage.
+            // The mark is read first. A directory or a pipe in its place counts as damage.
             Self::File(error) => {
                 let damage = [ErrorKind::IsADirectory, ErrorKind::InvalidInput];
                 let is_damage = damage.contains(&error.error.kind());
@@ -216,7 +215,7 @@ mod tests {
                 let error = FileError::at(&Path::new("run").join(name))(kind.into());
                 exit_of(&unusable(ReadRunError::File(error)))
             };
-            // A directory in the place of the mark is damage.
+            // A directory in the place of the mark counts as damage.
             let of_mark = match kind {
                 ErrorKind::IsADirectory => Exit::Failure,
                 _ => exit,

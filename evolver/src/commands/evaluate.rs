@@ -1,4 +1,5 @@
-//! `evolver evaluate`: a genome from new starts, under the conditions it evolved in or others.
+//! `evolver evaluate`: re-evaluates a genome from new starts, under its own or different
+//! conditions.
 
 use super::errors::unusable;
 use super::{BadInput, flag, genome_file, read_genome, thread_pool, threads_flag};
@@ -14,13 +15,13 @@ use minimal_surprise_evolution::text::terminal_path;
 use minimal_surprise_sim::{NoiseRate, Scenario, SeedTree};
 use std::path::{Path, PathBuf};
 
-/// Conditions as flags; lists give a table of all combinations.
+/// Conditions as flags; from lists, all combinations are evaluated.
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
-    /// The genome file, or a run directory; beside a run's config.toml, its conditions are the
-    /// defaults.
+    /// The genome file, or a run directory; if config.toml is in the same directory, its conditions
+    /// are the defaults.
     genome: PathBuf,
-    /// New starts under each of the conditions.
+    /// New starts per combination of conditions.
     #[arg(
         long,
         value_name = "N",
@@ -28,16 +29,16 @@ pub struct EvaluateArgs {
         allow_hyphen_values = true
     )]
     starts: String,
-    /// Grids, as in 15x15,20x20 [default: the run's, else 15x15].
+    /// Grids, such as 15x15,20x20 [default: the run's, else 15x15].
     #[arg(long, value_name = "WxH,…", allow_hyphen_values = true)]
     grid: Option<String>,
-    /// Noise levels, as in 0,0.05 [default: the run's, else 0].
+    /// Noise levels, such as 0,0.05 [default: the run's, else 0].
     #[arg(long, value_name = "P,…", allow_hyphen_values = true)]
     noise: Option<String>,
-    /// Swarm sizes, as in 50,100 [default: the run's, else 100].
+    /// Swarm sizes, such as 50,100 [default: the run's, else 100].
     #[arg(long, value_name = "N,…", allow_hyphen_values = true)]
     robots: Option<String>,
-    /// Steps of a run [default: the run's, else 500].
+    /// Steps per run [default: the run's, else 500].
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     steps: Option<String>,
     /// Root of all random numbers [default: the seed that the genome evolved with, else 0].
@@ -54,7 +55,7 @@ pub struct EvaluateArgs {
 /// Evaluates a genome.
 ///
 /// # Errors
-/// [`BadInput`] names the flag, the value and what would be valid.
+/// [`BadInput`] if the genome or a flag is invalid; the message lists the valid values.
 pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     let file = genome_file(&arguments.genome);
     let genome = read_genome(&arguments.genome)?;
@@ -122,7 +123,7 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The settings of the run that the genome came out of, if it lies in a run directory.
+/// Returns the settings of the run that produced the genome, if it is in a run directory.
 fn conditions_beside(genome: &Path) -> anyhow::Result<Option<Settings>> {
     let config = genome.with_file_name(CONFIG);
     if !files::exists(&config).map_err(unusable)? {
@@ -131,7 +132,7 @@ fn conditions_beside(genome: &Path) -> anyhow::Result<Option<Settings>> {
     Ok(Some(settings_of_run(files::parent(genome))?))
 }
 
-/// Values between commas.
+/// Parses values separated by commas.
 fn list<T>(
     name: &str,
     text: &str,

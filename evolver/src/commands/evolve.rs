@@ -27,29 +27,29 @@ use minimal_surprise_sim::{Engine, EnginePath};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// Settings as flags; a file has the same names. Defaults are the paper's.
+/// Settings as flags; a file uses the same names. The defaults are the paper's values.
 #[derive(Debug, Default, Args)]
 pub struct EvolveArgs {
     /// TOML file with any of the settings below; flags override it.
     config: Option<PathBuf>,
     #[command(flatten)]
     settings: SettingFlags,
-    /// Go on with a run that was interrupted, under the settings in its directory.
+    /// Resume an interrupted run, with the settings in its directory.
     #[arg(long, value_name = "DIR", conflicts_with = "config")]
     resume: Option<PathBuf>,
-    /// How progress is shown.
+    /// Display of the progress.
     #[arg(long, value_enum, default_value_t)]
     progress: ProgressMode,
-    /// What evaluates; the result does not depend on it.
+    /// Implementation of the evaluation; the result does not depend on it.
     #[arg(long, value_enum, default_value_t)]
     engine: EngineName,
-    /// Watch the run in the terminal as soon as it has ended.
+    /// Replay the run in the terminal as soon as it is finished.
     #[arg(long)]
     open: bool,
 }
 
 impl EvolveArgs {
-    /// All settings given; flags override the file.
+    /// Returns all settings given; flags override the file.
     fn given(&self) -> Result<Overrides, SettingError> {
         let mut given = self.settings.0.clone();
         if let Some(path) = &self.config {
@@ -59,18 +59,18 @@ impl EvolveArgs {
     }
 }
 
-/// What evaluates.
+/// Implementation of the evaluation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum EngineName {
-    /// The straight program.
+    /// The straightforward program.
     Plain,
-    /// The fast one, by the best instructions that this processor has; the environment variable
-    /// MINIMAL_SURPRISE_PATH forces portable, avx2 or avx512.
+    /// The fast engine, with the best instructions that this processor supports; the environment
+    /// variable MINIMAL_SURPRISE_PATH forces portable, avx2 or avx512.
     #[default]
     Fast,
 }
 
-/// How to run, whatever is run; no result depends on it.
+/// Options that no result depends on.
 #[derive(Clone, Copy, Debug)]
 struct RunOptions {
     progress: ProgressMode,
@@ -81,7 +81,8 @@ struct RunOptions {
 /// Evolves a swarm.
 ///
 /// # Errors
-/// [`BadInput`] before anything is written; other errors leave a run that can be resumed.
+/// [`BadInput`] if a setting is invalid; nothing has been written then. After other errors the run
+/// can be resumed.
 pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
     let given = arguments.given().map_err(unusable)?;
     let threads = given.threads().map_err(BadInput::new)?;
@@ -102,7 +103,7 @@ pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
             match RunDir::open(directory, limits::threads(threads)).map_err(unusable)? {
                 Opened::Unfinished(experiment, run) => (*experiment, run),
                 Opened::Finished(hash) => {
-                    // All of it, or a damaged one would be called complete.
+                    // Check every file, so that a damaged run is not reported as complete.
                     FinishedRun::read_and_check(directory).map_err(unusable)?;
                     if arguments.progress == ProgressMode::Json {
                         let done = serde_json::json!({"event": "done", "hash": hash, "run": text_of_path(directory)});
@@ -174,7 +175,7 @@ fn draw_seed() -> u64 {
     rand::random_range(0..=DRAWN_SEED_MAX)
 }
 
-/// Plays a run that has ended.
+/// Replays a finished run in the terminal.
 fn watch(directory: &Path, stop: &AtomicBool) -> anyhow::Result<Exit> {
     let finished = FinishedRun::read(directory)?;
     let recording = computing(finished.settings.scenario(), |after_step| {
@@ -183,8 +184,8 @@ fn watch(directory: &Path, stop: &AtomicBool) -> anyhow::Result<Exit> {
     in_terminal(&recording, Colouring::default(), stop)
 }
 
-/// Evaluates the generations that are left, saving each, and reports; says whether it came to the
-/// end.
+/// Evaluates and saves the remaining generations, and reports the result; returns whether all
+/// generations were completed.
 fn generations(
     mut experiment: Experiment,
     run: &RunDir,

@@ -15,7 +15,7 @@ use minimal_surprise_slots::MADE_WRITE_COUNT_MAX;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-/// What to export, and how.
+/// Arguments of `evolver export`.
 #[derive(Debug, Args)]
 pub struct ExportArgs {
     /// The genome file or a run directory; for trajectories, the run directory.
@@ -36,8 +36,8 @@ pub struct ExportArgs {
         allow_hyphen_values = true
     )]
     address: String,
-    /// For slot: number of this genome among all written to this robot, from 1. The robot runs the
-    /// genome with the larger number; `flash` prints its number.
+    /// For slot: write count of this genome, from 1. The robot runs the genome with the larger
+    /// write count; `flash` prints it.
     #[arg(
         long,
         value_name = "N",
@@ -46,10 +46,10 @@ pub struct ExportArgs {
     )]
     write_count: String,
     /// For c and rust: the name of the array [default: from the run or file name and the genome's
-    /// CRC, so that one program can hold several].
+    /// CRC, so that one program can contain several genomes].
     #[arg(long, value_name = "IDENTIFIER", allow_hyphen_values = true)]
     name: Option<String>,
-    /// For bin and slot: the chip, as probe-rs names it.
+    /// For bin and slot: the chip's name in probe-rs.
     #[arg(long, value_name = "CHIP", default_value = "STM32F407VGTx")]
     chip: String,
 }
@@ -57,11 +57,11 @@ pub struct ExportArgs {
 /// Formats of other programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
-    /// The genome container, for a firmware that reads it at a fixed address; prints how to write
-    /// it with probe-rs.
+    /// The genome container, for firmware that reads it at a fixed address; also prints the
+    /// probe-rs command that writes it.
     Bin,
-    /// A genome slot holding the genome, for a firmware with slots; prints how to write it with
-    /// probe-rs.
+    /// A genome slot that contains the genome, for firmware with slots; also prints the probe-rs
+    /// command that writes it.
     Slot,
     /// The genome as a C header.
     C,
@@ -82,7 +82,7 @@ pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
         return Err(BadInput::new("--name requires --format c or --format rust").into());
     }
     let address = flag("address", &arguments.address, memory_address)?;
-    // Leaves enough numbers for all later updates over the robot's line.
+    // The limit leaves enough numbers for all later updates over the serial line.
     let write_count = flag("write-count", &arguments.write_count, |text| {
         count(text, MADE_WRITE_COUNT_MAX)
     })?;
@@ -99,7 +99,7 @@ pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
         Some(path) => write_file("out", path, &bytes, Existing::Refuse)?,
     }
     let file = match arguments.format {
-        // The genome file is the raw container.
+        // A genome file is itself the raw container.
         Format::Bin => {
             let out = arguments.out.clone();
             Some(out.unwrap_or_else(|| genome_file(&arguments.from)))
@@ -170,7 +170,7 @@ fn genome(
     })
 }
 
-/// The genome's name in source code.
+/// Returns the genome's name in source code.
 fn symbol(arguments: &ExportArgs, container: &[u8]) -> Result<String, BadInput> {
     if let Some(name) = &arguments.name {
         return flag("name", name, |name| {
@@ -178,7 +178,7 @@ fn symbol(arguments: &ExportArgs, container: &[u8]) -> Result<String, BadInput> 
             checked.map(str::to_owned).map_err(str::to_owned)
         });
     }
-    // A run's genome is named after the run.
+    // Name a run's genome after the run.
     let file = genome_file(&arguments.from);
     let file = file.canonicalize().unwrap_or(file);
     let stem = file.file_stem().filter(|stem| *stem != "best");
@@ -187,11 +187,11 @@ fn symbol(arguments: &ExportArgs, container: &[u8]) -> Result<String, BadInput> 
     Ok(embedding::symbol(&name, container))
 }
 
-/// An address, decimal or hexadecimal.
+/// Parses a decimal or hexadecimal address.
 fn memory_address(text: &str) -> Result<u32, String> {
     let parsed = match text.strip_prefix("0x") {
         Some(digits) => u32::from_str_radix(digits, 16),
         None => text.parse(),
     };
-    parsed.map_err(|_| "expected an address from 0 to 0xffffffff, as in 0x080e0000".to_owned())
+    parsed.map_err(|_| "expected an address from 0 to 0xffffffff, such as 0x080e0000".to_owned())
 }

@@ -8,7 +8,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use std::path::PathBuf;
 
-/// Which genome, and where the robot is.
+/// Arguments of `evolver flash`.
 #[derive(Debug, Args)]
 pub struct FlashArgs {
     /// A genome file or a run directory.
@@ -21,8 +21,8 @@ pub struct FlashArgs {
 /// Writes a genome to the robot on a port and starts the robot.
 ///
 /// # Errors
-/// If the genome cannot be used, there is no such robot, or the robot fails. The robot switches
-/// genomes only once the new one is complete.
+/// If the genome is invalid, the robot cannot be reached, or the robot fails. The robot switches
+/// genomes only when the new genome is complete.
 pub fn flash(arguments: &FlashArgs) -> anyhow::Result<()> {
     let genome = read_genome(&arguments.genome)?;
     let container = genome.bytes();

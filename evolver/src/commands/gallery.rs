@@ -9,7 +9,7 @@ use minimal_surprise_evolution::text::terminal_path;
 use minimal_surprise_replay::gallery::write;
 use std::path::PathBuf;
 
-/// Which runs, and where to.
+/// Arguments of `evolver gallery`.
 #[derive(Debug, Args)]
 pub struct GalleryArgs {
     /// Run directories, or directories that contain run directories.
@@ -29,7 +29,7 @@ pub struct GalleryArgs {
 /// Writes a gallery.
 ///
 /// # Errors
-/// [`BadInput`](super::BadInput) if there are no runs, or the folder cannot be used.
+/// [`BadInput`](super::BadInput) if no runs are found or the folder cannot be used.
 pub fn gallery(arguments: &GalleryArgs) -> anyhow::Result<Exit> {
     let threads = threads_flag(&arguments.threads)?;
     let existing = Existing::with_overwrite(arguments.overwrite);

@@ -18,7 +18,7 @@ use minimal_surprise_evolution::text::{shell_path, terminal_path};
 use minimal_surprise_sim::SeedTree;
 use std::path::{Path, PathBuf};
 
-/// What to run, and where the robot is.
+/// Arguments of `evolver hil`.
 #[derive(Debug, Args)]
 #[command(override_usage = "evolver hil [OPTIONS] <--port <PORT>|--simulate> <RUN>")]
 pub struct HilArgs {
@@ -36,7 +36,8 @@ pub struct HilArgs {
 /// Runs a swarm whose robot 0 is on the line, and compares the result with the simulation.
 ///
 /// # Errors
-/// [`BadInput`] if the run cannot be read, there is no such robot, or it runs another genome.
+/// [`BadInput`] if the run cannot be read, the robot cannot be reached, or the robot runs a
+/// different genome.
 pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
     let (course, genome) = if arguments.run.is_dir() {
         of_run(arguments)?
@@ -85,7 +86,7 @@ pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
     }
 }
 
-/// The run recorded in a directory, and its genome file.
+/// Reads the run recorded in a directory; returns its trial and its genome file.
 fn of_run(arguments: &HilArgs) -> anyhow::Result<(HilTrial, PathBuf)> {
     let directory = &arguments.run;
     arguments
@@ -100,7 +101,7 @@ fn of_run(arguments: &HilArgs) -> anyhow::Result<(HilTrial, PathBuf)> {
     Ok((course, directory.join(BEST)))
 }
 
-/// The run that the flags define: the first trial of their seed.
+/// Creates the trial defined by the flags, which is the first trial of the seed.
 fn of_genome(arguments: &HilArgs) -> anyhow::Result<(HilTrial, PathBuf)> {
     let genome = read_genome(&arguments.run)?;
     let settings = arguments.conditions.settings(&genome)?;
@@ -114,7 +115,7 @@ fn of_genome(arguments: &HilArgs) -> anyhow::Result<(HilTrial, PathBuf)> {
     Ok((course, Path::new(&arguments.run).to_owned()))
 }
 
-/// The run with the robot, after a reset of its controller.
+/// Runs the swarm with the robot, after a reset of the robot's controller.
 fn run(course: &HilTrial, robot: &mut Robot) -> Result<HilRun, HilError<RobotError>> {
     robot.reset().map_err(HilError::Robot)?;
     let bar = ProgressBar::new(course.scenario.steps().into());
@@ -127,7 +128,7 @@ fn run(course: &HilTrial, robot: &mut Robot) -> Result<HilRun, HilError<RobotErr
     ran
 }
 
-/// The first difference between robot and simulation.
+/// Describes the first difference between robot and simulation.
 fn difference(ran: &HilRun, simulated: &HilRun) -> String {
     match ran.first_difference(simulated) {
         Some(step) => {

@@ -14,7 +14,7 @@ use minimal_surprise_sim::exchange::{
 };
 use std::path::{Path, PathBuf};
 
-/// The text files, and what they contain.
+/// Arguments of `evolver import`.
 #[derive(Debug, Args)]
 pub struct ImportArgs {
     /// The `action_genomes` file.
@@ -43,7 +43,7 @@ pub struct ImportArgs {
 /// Imports genomes.
 ///
 /// # Errors
-/// [`BadInput`] names the file and the line.
+/// [`BadInput`] if a file or a flag is invalid; the message names the file and the line.
 pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
     let only = match &arguments.generation {
         None => None,
@@ -62,7 +62,7 @@ pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
         && prediction.len() != action.len()
     {
         return Err(BadInput::new(format!(
-            "{} holds {} generations, {} holds {}",
+            "{} contains {} generations, {} contains {}",
             arguments.action.display(),
             action.len(),
             path.display(),
@@ -92,7 +92,7 @@ pub fn import(arguments: &ImportArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The numbered generations in a file; if only one is wanted, the others may be invalid.
+/// Reads the numbered generations in a file; if only one is requested, the others may be invalid.
 fn read(path: &Path, only: Option<u32>) -> anyhow::Result<Vec<(u32, GenomeRows)>> {
     let text = files::read_text(path, DATA_BYTES_MAX).map_err(unusable)?;
     let about = |error: ExchangeError| BadInput::new(format!("{}, {error}", path.display()));
@@ -109,7 +109,7 @@ fn read(path: &Path, only: Option<u32>) -> anyhow::Result<Vec<(u32, GenomeRows)>
     }
     match only {
         Some(only) if found.is_empty() => Err(BadInput::new(format!(
-            "--generation = {only}: {} holds generations 0 to {}",
+            "--generation = {only}: {} contains generations 0 to {}",
             path.display(),
             count - 1
         ))
@@ -118,7 +118,8 @@ fn read(path: &Path, only: Option<u32>) -> anyhow::Result<Vec<(u32, GenomeRows)>
     }
 }
 
-/// From the flags; what they leave open, from the length of the rows, padding included.
+/// Determines the topology from the flags and, if they do not specify it, from the row length
+/// including padding.
 fn topology(arguments: &ImportArgs, action: &[(u32, GenomeRows)]) -> Result<Topology, BadInput> {
     let length = action.first().map_or(0, |(_, rows)| rows.rows[0].len());
     let mut given = Overrides::default();
@@ -137,7 +138,7 @@ fn topology(arguments: &ImportArgs, action: &[(u32, GenomeRows)]) -> Result<Topo
     let topology = given.topology().map_err(BadInput::new)?;
     if free && arguments.prediction.is_none() {
         return Err(BadInput::new(
-            "--prediction is missing; without it, name the template with --predefine",
+            "--prediction is missing; to import without it, name the template with --predefine",
         ));
     }
     if free && topology.model() == SensorModel::C && length == 192 {

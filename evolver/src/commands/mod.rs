@@ -1,4 +1,4 @@
-//! One file a command: check what was given, do it, show it.
+//! The commands, one file each: check the arguments, do the work, print the result.
 
 pub mod bench;
 pub mod classify;
@@ -30,16 +30,16 @@ use minimal_surprise_evolution::run_files::{BEST, DONE};
 use minimal_surprise_evolution::settings::{THREADS_MAX, count};
 use std::path::{Path, PathBuf};
 
-/// The number of threads, by default one per core.
+/// Creates a pool of threads, by default one per core.
 ///
 /// # Errors
-/// If the operating system gives no threads.
+/// If the operating system cannot create the threads.
 pub fn thread_pool(threads: Option<u32>) -> Result<rayon::ThreadPool, rayon::ThreadPoolBuildError> {
     let threads = threads.unwrap_or(0) as usize;
     rayon::ThreadPoolBuilder::new().num_threads(threads).build()
 }
 
-/// A flag's value, or an error that names the flag.
+/// Parses a flag's value; an error names the flag.
 fn flag<T>(
     name: &str,
     text: &str,
@@ -48,7 +48,7 @@ fn flag<T>(
     parse(text).map_err(|problem| BadInput::new(format!("--{name} = {text}: {problem}")))
 }
 
-/// The value of `--threads`, if it was given.
+/// Parses the value of `--threads`, if given.
 fn threads_flag(given: &Option<String>) -> Result<Option<u32>, BadInput> {
     let given = given.as_deref();
     given
@@ -56,7 +56,7 @@ fn threads_flag(given: &Option<String>) -> Result<Option<u32>, BadInput> {
         .transpose()
 }
 
-/// The genome file that a path names: of a run directory, its best genome.
+/// Returns the genome file at a path; for a run directory, the file of its best genome.
 fn genome_file(path: &Path) -> PathBuf {
     if path.is_dir() {
         path.join(BEST)
@@ -65,17 +65,17 @@ fn genome_file(path: &Path) -> PathBuf {
     }
 }
 
-/// A genome file, or that of a run directory.
+/// Reads a genome file, or the best genome of a run directory.
 fn read_genome(path: &Path) -> anyhow::Result<GenomeFile> {
     if path.is_dir() {
-        // Without its mark the run is not complete; marked, it is damaged.
+        // Without its mark the run is incomplete; with it, the run is damaged.
         require(path, BEST)
             .or_else(|error| require(path, DONE).and(Err(error)))
             .map_err(unusable)?;
     }
     GenomeFile::read(&genome_file(path)).map_err(|error| match error {
         GenomeFileError::File(error) => unusable(error),
-        // Of a run directory it is the run that is damaged.
+        // In a run directory, an invalid genome means that the run is damaged.
         error if path.is_dir() => error.into(),
         error => BadInput::new(error).into(),
     })

@@ -1,4 +1,4 @@
-//! `evolver monitor`: shows live what a robot does.
+//! `evolver monitor`: shows a robot's activity live.
 
 use super::flag;
 use super::port::{PortArgs, failed};
@@ -15,7 +15,7 @@ use serde_json::json;
 use std::io;
 use std::time::{Duration, Instant};
 
-/// Which robot, and how to show it.
+/// Arguments of `evolver monitor`.
 #[derive(Debug, Args)]
 pub struct MonitorArgs {
     #[command(flatten)]
@@ -31,9 +31,9 @@ pub struct MonitorArgs {
 /// Shows the robot's activity every second.
 ///
 /// # Errors
-/// If there is no such robot, it disconnects, or its reports are impossible.
+/// If the robot cannot be reached, disconnects, or reports impossible values.
 pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
-    // Without a time, an interruption is the normal end.
+    // Without a time limit, an interruption is the normal end.
     let (seconds, interrupted) = match &arguments.seconds {
         None => (u32::MAX, Exit::Done),
         Some(text) => {
@@ -76,7 +76,7 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
                 recent: before.and_then(|before| since(before, report.surprise)),
             };
             match show.sample(&sample) {
-                // The reader has closed the pipe: a normal end.
+                // A pipe closed by its reader is a normal end.
                 Err(error) if output::is_gone(&error) => return Ok(Exit::Done),
                 shown => shown?,
             }
@@ -89,7 +89,7 @@ pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
     Ok(exit)
 }
 
-/// Share of bits mispredicted; `None` before the first bit.
+/// Returns the share of mispredicted bits; `None` before the first bit.
 fn share(surprise: Surprise) -> Option<f64> {
     (surprise.seen_bits > 0).then(|| surprise.mispredicted_bits as f64 / surprise.seen_bits as f64)
 }

@@ -1,10 +1,10 @@
-//! Files that a flag names.
+//! Files named by a flag.
 
 use super::BadInput;
 use minimal_surprise_evolution::files::{self, Existing};
 use std::path::Path;
 
-/// Refuses a path that exists.
+/// Rejects a path that exists.
 pub(super) fn refuse_existing(flag: &str, path: &Path, overwrite: bool) -> Result<(), BadInput> {
     if !overwrite && path.symlink_metadata().is_ok() {
         return Err(exists(flag, path, ", or replace it with --overwrite"));
@@ -12,7 +12,7 @@ pub(super) fn refuse_existing(flag: &str, path: &Path, overwrite: bool) -> Resul
     Ok(())
 }
 
-/// The error for a path that exists.
+/// Creates the error for a path that exists.
 fn exists(flag: &str, path: &Path, or_else: &str) -> BadInput {
     BadInput::new(format!(
         "--{flag} = {}: it exists; name another{or_else}",

@@ -1,4 +1,4 @@
-//! `evolver replay` to files: stills and animations.
+//! `evolver replay` with output to files: stills and animations.
 
 use super::new_file::{refuse_existing, write_file};
 use super::{BadInput, flag};
@@ -13,7 +13,7 @@ use minimal_surprise_replay::recording::Recording;
 use minimal_surprise_replay::scene::Colouring;
 use std::path::{Path, PathBuf};
 
-/// Which pictures to write, and how they look.
+/// Flags of `evolver replay` for pictures.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Pictures")]
 #[command(group = ArgGroup::new("still").args(["svg", "png"]).multiple(true))]
@@ -32,13 +32,13 @@ pub struct PictureArgs {
     /// Write an animation as MP4, encoded by ffmpeg; the file must not exist.
     #[arg(long, value_name = "FILE")]
     mp4: Option<PathBuf>,
-    /// What a still shows [default: damage with --remove or --reposition, else state].
+    /// Content of a still [default: damage with --remove or --reposition, else state].
     #[arg(long, value_enum, requires = "still")]
     what: Option<Picture>,
     /// The state that a still shows, 0 to the number of steps [default: the last].
     #[arg(long, value_name = "T", requires = "still", allow_hyphen_values = true)]
     at: Option<String>,
-    /// Select this robot: mark what it senses and predicted.
+    /// Select this robot: mark its sensor readings and predictions.
     #[arg(
         long,
         value_name = "N",
@@ -127,10 +127,10 @@ impl PictureArgs {
         self.files().iter().any(|(_, file)| file.is_some())
     }
 
-    /// Refuses files that exist, before anything is computed.
+    /// Rejects files that exist, before anything is computed.
     ///
     /// # Errors
-    /// [`BadInput`] names the flag and the file.
+    /// [`BadInput`] if a file exists; the message names the flag and the file.
     pub(super) fn refuse_existing(&self, overwrite: bool) -> Result<(), BadInput> {
         let files = self.files().into_iter();
         let mut given = files.filter_map(|(flag, file)| Some((flag, file?)));
@@ -140,7 +140,7 @@ impl PictureArgs {
     /// Writes the pictures.
     ///
     /// # Errors
-    /// [`BadInput`] names the flag, the value and the valid values.
+    /// [`BadInput`] if a flag is invalid; the message lists the valid values.
     pub(super) fn write(
         &self,
         recording: &Recording,

@@ -10,19 +10,19 @@ use minimal_surprise_evolution::text::shell_path;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Default speed of the line, in bits per second.
+/// Default speed of the serial line, in bits per second.
 const BAUD: &str = "115200";
 
-/// Which robot.
+/// The robot's port, as flags.
 #[derive(Debug, Args)]
 pub struct PortArgs {
     /// The robot's serial port, such as /dev/ttyACM0 or COM3.
     #[arg(long, value_name = "PORT")]
     port: PathBuf,
-    /// Speed of the line, in bits per second.
+    /// Speed of the serial line, in bits per second.
     #[arg(long, value_name = "N", default_value = BAUD, allow_hyphen_values = true)]
     baud: String,
-    /// How long to wait for the robot, in seconds: some boards restart when the port is opened.
+    /// Time to wait for the robot, in seconds: some boards restart when the port is opened.
     #[arg(
         long,
         value_name = "SECONDS",
@@ -33,13 +33,13 @@ pub struct PortArgs {
 }
 
 impl PortArgs {
-    /// The port's name.
+    /// Returns the port's name.
     pub(super) fn name(&self) -> PortName {
         PortName(self.port.clone())
     }
 
-    /// Checks the flags and connects. From here on the first signal ends the work with the robot,
-    /// and the second exits.
+    /// Checks the flags and connects. Afterwards, the first signal ends the work with the robot and
+    /// the second exits.
     pub(super) fn connect(&self) -> anyhow::Result<Robot> {
         let baud = flag("baud", &self.baud, |text| count(text, 12_000_000))?;
         let wait = flag("wait", &self.wait, |text| count(text, 3600))?;
@@ -55,7 +55,7 @@ impl PortArgs {
         Ok(robot)
     }
 
-    /// The command line of another command on the same port.
+    /// Returns the command line of a different command on the same port.
     pub(super) fn command(&self, command: &str) -> String {
         let port = shell_path(&self.port);
         let line = format!("{} {command} --port {port}", program());
@@ -66,7 +66,7 @@ impl PortArgs {
     }
 }
 
-/// The error of a command after an error of the port or robot.
+/// Converts an error of the port or robot to an error of the command.
 pub(super) fn failed(error: RobotError) -> anyhow::Error {
     match error.problem {
         Problem::NoSuchPort { .. } | Problem::NotAPort { .. } | Problem::NotUtf8 => {

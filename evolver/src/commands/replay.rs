@@ -37,13 +37,13 @@ Keys in the terminal:
   ← →                 step back, forward; ↑ ↓ (PgUp PgDn) by ten
   0–9 Home End        seek, by tenths of the run
   + -                 speed
-  n p (Tab Shift-Tab) select next, previous robot: what it senses and predicted; Esc deselects
+  n p (Tab Shift-Tab) select next, previous robot: its readings and predictions; Esc deselects
   c                   colour: structure, surprise, plain
-  b                   the swarm before it was damaged, and back
-  h j k l             scroll, where the grid is larger than the window
+  b                   switch between the swarm before and after damage
+  h j k l             scroll, if the grid is larger than the window
   q Ctrl-C            quit";
 
-/// What to show, and how.
+/// Arguments of `evolver replay`.
 #[derive(Debug, Args)]
 #[command(after_help = KEYS)]
 pub struct ReplayArgs {
@@ -64,7 +64,7 @@ pub struct ReplayArgs {
     reposition: Option<String>,
     #[command(flatten)]
     conditions: GenomeConditions,
-    /// What the colours of robots show.
+    /// Meaning of the robots' colours.
     #[arg(long, value_enum, default_value_t)]
     colour: Colouring,
     #[command(flatten)]
@@ -80,7 +80,7 @@ pub struct ReplayArgs {
 /// Shows a run.
 ///
 /// # Errors
-/// [`BadInput`] if there is nothing to show, or a flag does not fit.
+/// [`BadInput`] if the run cannot be read, has no steps, or a flag is invalid.
 pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<Exit> {
     let overwrite = arguments.overwrite;
     let existing = Existing::with_overwrite(overwrite);
@@ -91,7 +91,7 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<Exit> {
     let recording = recording(arguments)?;
     if recording.steps() == 0 {
         return Err(BadInput::new(format!(
-            "{}: it has one state and no step; there is nothing to replay",
+            "{}: contains one state and no steps; nothing to replay",
             arguments.run.display()
         ))
         .into());
@@ -107,14 +107,15 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<Exit> {
             .pictures
             .write(&recording, arguments.colour, existing)?;
     } else if arguments.html.is_none() {
-        // In the terminal Ctrl-C is a key; this handles signals from elsewhere.
+        // In the terminal, Ctrl-C is read as a key; this handles signals from other processes.
         on_signal(ask_to_stop)?;
         return in_terminal(&recording, arguments.colour, stop());
     }
     Ok(Exit::Done)
 }
 
-/// Plays a recording in the terminal until the user or `stop` ends it; returns which of them did.
+/// Plays a recording in the terminal until the user quits or `stop` is set; returns the matching
+/// exit code.
 ///
 /// # Errors
 /// [`BadInput`] if standard output is not a terminal.
@@ -151,7 +152,7 @@ pub(super) fn check_terminal() -> Result<(), String> {
     }
 }
 
-/// The colours that `COLORTERM`, `TERM` and `NO_COLOR` allow.
+/// Returns the colours that `COLORTERM`, `TERM` and `NO_COLOR` allow.
 fn paints() -> Paints {
     match supports_color::on(Stream::Stdout) {
         Some(level) if level.has_16m => Paints::True,
@@ -228,7 +229,8 @@ fn of_run(
     .map_err(|error| about(&error))
 }
 
-/// Refuses what does not fit in this machine's memory or on a page, before any step is computed.
+/// Rejects a recording that does not fit in this machine's memory or on a page, before any step is
+/// computed.
 fn check_size(arguments: &ReplayArgs, scenario: &Scenario) -> Result<(), BadInput> {
     let needs = Needs::of_recording(scenario);
     needs.check_memory().map_err(BadInput::new)?;
@@ -240,7 +242,7 @@ fn check_size(arguments: &ReplayArgs, scenario: &Scenario) -> Result<(), BadInpu
     Ok(())
 }
 
-/// The run that the flags define: the first trial of their seed.
+/// Records the run defined by the flags: the first trial of the seed.
 fn of_genome(arguments: &ReplayArgs, path: &Path, name: &str) -> anyhow::Result<Recording> {
     let conditions = &arguments.conditions;
     let file = read_genome(path)?;

@@ -1,5 +1,5 @@
-//! Settings as flags, generated from their table; and the conditions of one run, which a run
-//! directory records and a genome file gets from flags.
+//! Flags for settings, generated from the table of settings; and flags for the conditions of a
+//! single run from a genome file.
 
 use super::BadInput;
 use clap::builder::{OsStringValueParser, ValueParser};
@@ -86,7 +86,7 @@ fn conditions() -> impl Iterator<Item = &'static Setting> {
     SETTINGS.iter().filter(|s| CONDITIONS.contains(&s.name))
 }
 
-/// The flags that a genome file takes.
+/// The flags for a run of a genome file.
 #[derive(Clone, Debug, Default)]
 pub struct GenomeConditions(Overrides);
 
@@ -126,10 +126,10 @@ impl FromArgMatches for GenomeConditions {
 }
 
 impl GenomeConditions {
-    /// Refuses flags beside a file that records the conditions itself.
+    /// Rejects these flags for a file that already records the conditions.
     ///
     /// # Errors
-    /// [`BadInput`] names the flag.
+    /// [`BadInput`] if a flag was given.
     pub(super) fn refuse_beside(&self, what: &str, path: &Path) -> Result<(), BadInput> {
         match conditions().find(|setting| self.0.place(setting.name).is_some()) {
             None => Ok(()),
@@ -140,10 +140,10 @@ impl GenomeConditions {
         }
     }
 
-    /// The settings for a run of a genome.
+    /// Returns the settings for a run of a genome.
     ///
     /// # Errors
-    /// [`BadInput`] names the flag, the value and the valid values.
+    /// [`BadInput`] if a flag is invalid; the message lists the valid values.
     pub(super) fn settings(&self, genome: &GenomeFile) -> Result<Settings, BadInput> {
         let topology = genome.topology();
         let mut overrides = self.0.clone();

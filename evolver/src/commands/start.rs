@@ -5,7 +5,7 @@ use super::port::{PortArgs, failed};
 /// Starts the robot.
 ///
 /// # Errors
-/// If there is no such robot, or it refuses.
+/// If the robot cannot be reached or rejects the request.
 pub fn start(arguments: &PortArgs) -> anyhow::Result<()> {
     switch(arguments, true)
 }
@@ -13,7 +13,7 @@ pub fn start(arguments: &PortArgs) -> anyhow::Result<()> {
 /// Stops the robot.
 ///
 /// # Errors
-/// If there is no such robot, or it refuses.
+/// If the robot cannot be reached or rejects the request.
 pub fn stop(arguments: &PortArgs) -> anyhow::Result<()> {
     switch(arguments, false)
 }

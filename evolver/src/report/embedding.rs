@@ -1,4 +1,4 @@
-//! Genomes as source code, to link into a firmware, and as images, to write to a chip.
+//! Genomes as source code, to link into firmware, and as images, to write to a chip.
 
 use crate::robot::length_and_crc;
 use ihex::{Record, create_object_file_representation};
@@ -8,22 +8,22 @@ use minimal_surprise_evolution::text::{identifier, shell_path, shell_word};
 use minimal_surprise_slots::Header;
 use std::path::Path;
 
-/// Bytes per line, in source code and Intel HEX.
+/// Number of bytes per line, in source code and Intel HEX.
 const LINE_BYTES: usize = 16;
 
-/// A genome's name in source code, from its file or run and its CRC, so that one program can hold
-/// several.
+/// Returns a genome's name in source code, from its file or run and its CRC, so that one program
+/// can contain several genomes.
 #[must_use]
 pub fn symbol(name: &str, container: &[u8]) -> String {
     let crc = length_and_crc(container).map_or(0, |(_, crc)| crc);
     format!("minimal_surprise_genome_{}_{crc:08x}", identifier(name)).replace("__", "_")
 }
 
-/// A C header with the container as an array with this name.
+/// Generates a C header that contains the container as an array with this name.
 #[must_use]
 pub fn c_header(genome: &GenomeFile, symbol: &str) -> String {
     let container = genome.bytes();
-    // Unchanged: names that differ only in case are different.
+    // Keep the case, since names that differ only in case are different.
     let guard = format!("{symbol}_INCLUDED");
     format!(
         "/* A minimal-surprise genome: {}. */\n\
@@ -38,7 +38,7 @@ pub fn c_header(genome: &GenomeFile, symbol: &str) -> String {
     )
 }
 
-/// Rust source with the container as a static with this name.
+/// Generates Rust source that contains the container as a static with this name.
 #[must_use]
 pub fn rust_source(genome: &GenomeFile, symbol: &str) -> String {
     let container = genome.bytes();
@@ -59,7 +59,7 @@ fn hex_lines(container: &[u8]) -> String {
     container.chunks(LINE_BYTES).map(line).collect()
 }
 
-/// The container as Intel HEX at this address; `None` if it would exceed 32 bits.
+/// Encodes the container as Intel HEX at this address; `None` if an address would exceed 32 bits.
 #[must_use]
 pub fn intel_hex(container: &[u8], address: u32) -> Option<String> {
     let mut records = Vec::new();
@@ -67,7 +67,7 @@ pub fn intel_hex(container: &[u8], address: u32) -> Option<String> {
     let mut at = address;
     let mut rest = container;
     while !rest.is_empty() {
-        // A record has a 16-bit address and must not cross its end.
+        // A record has a 16-bit address and must not cross a 64 KiB boundary.
         let until_carry = 0x1_0000 - (at as usize & 0xffff);
         let (value, after) = rest.split_at(rest.len().min(LINE_BYTES).min(until_carry));
         let high = (at >> 16) as u16;
@@ -91,11 +91,11 @@ pub fn intel_hex(container: &[u8], address: u32) -> Option<String> {
     create_object_file_representation(&records).ok()
 }
 
-/// A committed genome slot up to the end of the container, for a robot that keeps genomes in slots.
-/// Of its two slots the robot uses the one with the larger `write_count`, which is 1 or more.
+/// Creates a committed genome slot up to the end of the container, for a robot with genome slots.
+/// The robot uses the slot with the larger `write_count`, which is 1 or more.
 ///
 /// # Panics
-/// If it is not a container: those are longer than four bytes and shorter than 64 KiB.
+/// If `container` is not longer than four bytes or not shorter than 64 KiB.
 #[must_use]
 pub fn slot(container: &[u8], write_count: u32) -> Vec<u8> {
     let (length, crc) = length_and_crc(container).expect("a container has a CRC");
@@ -107,7 +107,7 @@ pub fn slot(container: &[u8], write_count: u32) -> Vec<u8> {
     [&header.front(), container].concat()
 }
 
-/// The command that writes a file to a chip through a debug probe.
+/// Returns the command that writes a file to a chip through a debug probe.
 #[must_use]
 pub fn probe_rs_line(file: &Path, chip: &str, address: u32) -> String {
     format!(

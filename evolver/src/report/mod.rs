@@ -1,4 +1,4 @@
-//! What people and other programs get to see: progress, files, and words at the end.
+//! Output for users and other programs: progress, tables, summaries and JSON.
 
 pub mod embedding;
 pub mod picture;
@@ -10,7 +10,7 @@ pub mod summary;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
-/// A table without a frame.
+/// Creates a table without a frame.
 fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table
@@ -20,7 +20,7 @@ fn table(header: &[&str]) -> Table {
     table
 }
 
-/// The table with some columns aligned to the right, without spaces at the ends of lines.
+/// Formats a table with some columns aligned to the right, without trailing spaces.
 fn right_aligned(mut table: Table, columns: &[usize]) -> String {
     for &index in columns {
         if let Some(column) = table.column_mut(index) {

@@ -1,4 +1,4 @@
-//! A swarm as a picture of characters.
+//! Picture of a swarm, in characters.
 
 use crate::output::stdout_is_ascii;
 use console::{Style, Term};
@@ -8,9 +8,9 @@ use minimal_surprise_sim::{Grid, Pose};
 /// Maximum number of rows and columns of the picture if the output is not a terminal.
 const WITHOUT_TERMINAL: (u16, u16) = (60, 120);
 
-/// A picture of the swarm, two columns per cell: members as filled arrows (coloured on a terminal),
-/// the others hollow. In ASCII, where both look alike, members have a star. If it does not fit, a
-/// line that says so.
+/// Draws the swarm, two columns per cell: members as filled arrows (coloured on a terminal), the
+/// others hollow. In ASCII, where both would look the same, members have a star. If the picture
+/// does not fit, returns a note instead.
 #[must_use]
 pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> String {
     let (rows, columns) = Term::stdout().size_checked().unwrap_or(WITHOUT_TERMINAL);

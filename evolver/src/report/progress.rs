@@ -1,4 +1,4 @@
-//! Progress of a run: a bar, lines, JSON, or nothing.
+//! Progress of a run, shown as a bar, lines, JSON, or not at all.
 
 use crate::output;
 use clap::ValueEnum;
@@ -9,10 +9,10 @@ use minimal_surprise_evolution::settings::Settings;
 use minimal_surprise_sim::Scenario;
 use std::time::{Duration, Instant};
 
-/// Fewest columns of a terminal for a bar beside the numbers.
+/// Minimum number of columns of a terminal for a bar beside the numbers.
 const COLUMNS_FOR_BAR: u16 = 40;
 
-/// How progress is shown.
+/// Display of the progress.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum ProgressMode {
     /// A bar if standard error is a terminal that can draw one, otherwise lines.
@@ -22,13 +22,13 @@ pub enum ProgressMode {
     Bar,
     /// One line per generation, on standard error.
     Lines,
-    /// One JSON object per generation, on standard output; nothing else is printed there.
+    /// One JSON object per generation, on standard output; no other text is printed there.
     Json,
     /// No progress.
     None,
 }
 
-/// Shows the progress of one run.
+/// Display of the progress of one run.
 #[derive(Debug)]
 pub struct Progress {
     shown: Shown,
@@ -50,7 +50,7 @@ pub(super) enum Shown {
 }
 
 impl Shown {
-    /// Chooses the display for a mode and standard error; `numbers` stand beside a bar.
+    /// Chooses the display for a mode and standard error; `numbers` is the text beside a bar.
     pub(super) fn new(mode: ProgressMode, numbers: &str, of: impl FnOnce() -> ProgressBar) -> Self {
         match mode {
             ProgressMode::Auto | ProgressMode::Bar if output::stderr_is_screen() => {
@@ -63,10 +63,10 @@ impl Shown {
     }
 }
 
-/// Robot-steps from which a run computed in one go takes seconds.
+/// Number of robot-steps above which computing a run takes seconds.
 const LONG_ROBOT_STEPS: u64 = 2_000_000;
 
-/// Computes a run in one go, and shows its steps if it takes seconds; `compute` gets a callback to
+/// Computes a run, and shows its progress if it takes seconds; `compute` receives a callback to
 /// call after every step.
 pub fn computing<T>(scenario: &Scenario, compute: impl FnOnce(&dyn Fn()) -> T) -> T {
     let bar = steps_bar(scenario);
@@ -75,8 +75,8 @@ pub fn computing<T>(scenario: &Scenario, compute: impl FnOnce(&dyn Fn()) -> T) -
     computed
 }
 
-/// A bar for a run computed in one go, hidden if the run is short. If no bar can be drawn, prints a
-/// line instead.
+/// Creates a bar for the steps of a run, hidden if the run is short. If no bar can be drawn, prints
+/// a line instead.
 #[must_use]
 fn steps_bar(scenario: &Scenario) -> ProgressBar {
     let (robots, steps) = (scenario.robots(), scenario.steps());
@@ -93,7 +93,8 @@ fn steps_bar(scenario: &Scenario) -> ProgressBar {
     }
 }
 
-/// A bar on standard error, hidden if none can be drawn; `numbers` stand beside it.
+/// Creates a bar on standard error, hidden if it cannot be drawn; `numbers` is the text beside the
+/// bar.
 pub(crate) fn bar(bar: ProgressBar, numbers: &str) -> ProgressBar {
     if !output::stderr_is_screen() {
         return ProgressBar::hidden();
@@ -112,7 +113,7 @@ pub(crate) fn bar(bar: ProgressBar, numbers: &str) -> ProgressBar {
 }
 
 impl Progress {
-    /// Starts the clock. `done` generations were completed before.
+    /// Starts the display and its clock; `done` generations were completed before.
     #[must_use]
     pub fn start(mode: ProgressMode, settings: &Settings, done: u32) -> Self {
         let bar = || ProgressBar::new(settings.generations().into()).with_position(done.into());
@@ -127,7 +128,7 @@ impl Progress {
         }
     }
 
-    /// Shows a generation.
+    /// Shows a completed generation.
     pub fn generation(&self, record: &GenerationRecord) {
         let best = record.best_matches as f64 / self.scored_bits;
         let mean = record.total_matches as f64 / self.scored_bits / self.population;
@@ -176,7 +177,7 @@ impl Progress {
     }
 }
 
-/// A duration for people.
+/// Formats a duration in hours, minutes and seconds.
 pub(crate) fn seconds(duration: Duration) -> String {
     let seconds = duration.as_secs_f64().round() as u64;
     match (seconds / 3600, seconds / 60 % 60, seconds % 60) {

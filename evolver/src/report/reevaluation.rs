@@ -1,4 +1,4 @@
-//! Tables of re-evaluations, and of resilience to damage.
+//! Tables and JSON of re-evaluations and of resilience to damage.
 
 use minimal_surprise_evolution::reevaluation::{Rerun, ResilienceRow, mean, median};
 use minimal_surprise_evolution::run_files::{self, SCHEMA_VERSION};
@@ -7,18 +7,19 @@ use minimal_surprise_sim::Scenario;
 use minimal_surprise_sim::structures::{LineOrientation, Structure, in_words};
 use serde_json::{Map, Value, json};
 
-/// One combination of conditions, and its runs.
+/// A combination of conditions, with its runs.
 #[derive(Clone, Debug)]
 pub struct Condition {
     /// The conditions.
     pub scenario: Scenario,
-    /// Noise as given.
+    /// Noise, as given by the user.
     pub noise: f64,
     /// The runs, one per start.
     pub reruns: Vec<Rerun>,
 }
 
-/// Returns how many runs each structure dominates; a tie of k counts 1/k for each.
+/// Returns the number of runs that each structure dominates; in a tie of k structures, each counts
+/// 1/k.
 #[must_use]
 pub fn name_counts(reruns: &[Rerun]) -> Vec<(Structure, f64)> {
     let count = |structure| {
@@ -37,7 +38,7 @@ fn fitnesses(reruns: &[Rerun]) -> Vec<f64> {
     reruns.iter().map(|rerun| rerun.fitness).collect()
 }
 
-/// The orientation of lines in most runs; none if no run has lines.
+/// Returns the orientation of lines in most runs; an empty text if no run has lines.
 fn orientation(reruns: &[Rerun]) -> String {
     if !reruns.iter().any(|r| r.names.contains(&Structure::Line)) {
         return String::new();
@@ -46,7 +47,7 @@ fn orientation(reruns: &[Rerun]) -> String {
     LineOrientation::of_most(&runs).map_or("diverse".to_owned(), |most| most.name().to_owned())
 }
 
-/// A table of the conditions, for people.
+/// Formats the conditions as a table.
 #[must_use]
 pub fn conditions_text(conditions: &[Condition]) -> String {
     let mut table = super::table(&[
@@ -82,13 +83,13 @@ pub fn conditions_text(conditions: &[Condition]) -> String {
     super::right_aligned(table, &[1, 2, 3, 4])
 }
 
-/// A count without unnecessary decimals.
+/// Formats a count without unnecessary decimals.
 fn plain(count: f64) -> String {
     let text = format!("{count:.2}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// The conditions as JSON, for programs.
+/// Converts the conditions to JSON.
 #[must_use]
 pub fn conditions_json(conditions: &[Condition], seed: u64) -> Value {
     let rows: Vec<Value> = conditions
@@ -130,7 +131,7 @@ pub fn conditions_json(conditions: &[Condition], seed: u64) -> Value {
     object
 }
 
-/// Rows of Tables 7 and 8 for people: the mean, and for several runs the median in brackets.
+/// Formats rows of Tables 7 and 8: the mean, and for several runs the median in brackets.
 #[must_use]
 pub fn resilience_text(structure: Structure, rows: &[ResilienceRow]) -> String {
     let mut table = super::table(&[
@@ -168,7 +169,7 @@ pub fn resilience_text(structure: Structure, rows: &[ResilienceRow]) -> String {
     )
 }
 
-/// The same rows as JSON, with the values of every run.
+/// Converts rows of Tables 7 and 8 to JSON, with the values of every run.
 #[must_use]
 pub fn resilience_json(structure: Structure, rows: &[ResilienceRow]) -> Value {
     let rows: Vec<Value> = rows

@@ -1,4 +1,4 @@
-//! What a swarm formed, as a picture and a table, or as JSON.
+//! Structures of a swarm, as a picture and a table, or as JSON.
 
 use super::picture::picture;
 use minimal_surprise_evolution::run_files::{MeasuresOfRun, SCHEMA_VERSION, names};
@@ -15,19 +15,19 @@ pub struct Classified<'a> {
     pub grid: Grid,
     /// The state.
     pub poses: &'a [Pose],
-    /// Its structures.
+    /// The structures in this state.
     pub found: &'a Structures,
-    /// Measures of the run that led there.
+    /// Measures of the run that ended in this state.
     pub measures: Option<&'a Measures>,
 }
 
-/// The run's dominant structure in words: `lines`, `lines and pairs (tied)`, `nothing`.
+/// Returns the dominant structure in words: `lines`, `lines and pairs (tied)`, `nothing`.
 #[must_use]
 pub fn name(found: &Structures) -> String {
     in_words(&found.names())
 }
 
-/// The picture, with the robots of the dominant structure highlighted.
+/// Draws the swarm, with the robots of the dominant structure highlighted.
 #[must_use]
 pub fn highlighted(classified: &Classified<'_>) -> String {
     let Classified {
@@ -41,7 +41,7 @@ pub fn highlighted(classified: &Classified<'_>) -> String {
     })
 }
 
-/// Text for people.
+/// Formats the picture, a table of structures, and the measures.
 #[must_use]
 pub fn text(classified: &Classified<'_>) -> String {
     let Classified {
@@ -114,7 +114,7 @@ fn details(found: &Structures, structure: Structure) -> String {
     }
 }
 
-/// JSON for programs.
+/// Converts the classified state to JSON.
 #[must_use]
 pub fn json(classified: &Classified<'_>) -> Value {
     let found = classified.found;

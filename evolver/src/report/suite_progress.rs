@@ -1,4 +1,4 @@
-//! Progress of a suite: suite, experiment and run level, with the time left by what was measured.
+//! Progress of a suite, with an estimate of the remaining time.
 
 use super::progress::{ProgressMode, Shown, seconds};
 use crate::output::for_stderr;
@@ -11,7 +11,7 @@ use std::cell::{Cell, RefCell};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Shows the progress of the runs of one process.
+/// Display of the progress of one process's runs.
 #[derive(Debug)]
 pub struct SuiteProgress<'a> {
     shown: Shown,
@@ -19,17 +19,18 @@ pub struct SuiteProgress<'a> {
     plan: &'a Plan,
     runs: u64,
     done_before: u64,
-    /// Runs completed, and robot-steps worked, by this process.
+    /// Number of runs that this process has completed.
     completed: Cell<u64>,
     worked: Cell<u64>,
-    /// Robot-steps that runs still need.
+    /// Number of remaining robot-steps.
     left: Cell<u64>,
-    /// The run that is worked on, and its robot-steps that are not left any more.
+    /// ID of the current run, and its number of robot-steps already subtracted from `left`.
     settled: RefCell<(String, u64)>,
 }
 
 impl<'a> SuiteProgress<'a> {
-    /// Starts the clock: of `runs` runs, `waiting` are to be done and need `left` robot-steps.
+    /// Starts the display and its clock; of `runs` runs, `waiting` are still to be done and need
+    /// `left` robot-steps.
     #[must_use]
     pub fn start(mode: ProgressMode, plan: &'a Plan, runs: u64, waiting: u64, left: u64) -> Self {
         let bar = || ProgressBar::new(runs).with_position(runs - waiting);
@@ -62,19 +63,21 @@ impl<'a> SuiteProgress<'a> {
         self.left().map_or_else(String::new, words)
     }
 
-    /// None while this process has worked nothing, or if it is longer than can be said.
+    /// Estimates the remaining time; `None` before this process has completed a generation, or if
+    /// the time overflows a [`Duration`].
     fn left(&self) -> Option<Duration> {
         let left = self.started.elapsed().as_secs_f64() * self.share_left()?;
         Duration::try_from_secs_f64(left).ok()
     }
 
-    /// Returns what is left, by what this process has worked.
+    /// Returns the remaining work relative to the work done by this process.
     fn share_left(&self) -> Option<f64> {
         let worked = self.worked.get();
         (worked > 0).then(|| self.left.get() as f64 / worked as f64)
     }
 
-    /// Takes the generations of a run from what is left, also those that others have done.
+    /// Subtracts the completed generations of a run from the remaining work, including generations
+    /// completed by other processes.
     fn settle(&self, run: &PlannedRun, generation: u32) {
         let mut settled = self.settled.borrow_mut();
         if settled.0 != run.id {
@@ -151,7 +154,7 @@ impl Watch for SuiteProgress<'_> {
     }
 }
 
-/// Shows runs beyond a plan, whose number is not known in advance.
+/// Display of the progress of runs beyond a plan, whose number is not known in advance.
 #[derive(Debug)]
 pub struct SearchProgress {
     shown: Shown,
@@ -159,7 +162,7 @@ pub struct SearchProgress {
 }
 
 impl SearchProgress {
-    /// For the experiment that searches.
+    /// Starts the display for the experiment that searches.
     #[must_use]
     pub fn start(mode: ProgressMode, experiment: &str) -> Self {
         let prefix = for_stderr(experiment).into_owned();
@@ -213,7 +216,12 @@ impl Watch for SearchProgress {
 
 fn waits(shown: &Shown, run: &PlannedRun, directory: &Path, holder: Option<&Holder>) {
     let who = lock::named(holder);
-    let say = || tell!("waiting for {}: {who} works on it", directory.display());
+    let say = || {
+        tell!(
+            "waiting for {}: {who} is working on it",
+            directory.display()
+        )
+    };
     match shown {
         Shown::Bar(bar) => bar.suspend(say),
         Shown::Json => {
@@ -262,7 +270,7 @@ mod tests {
         let (small, large) = (&runs[0], &runs[1]);
         let all = runs.iter().map(|run| run.settings.robot_steps()).sum();
         let shown = SuiteProgress::start(ProgressMode::None, &plan, 2, 2, all);
-        assert_eq!(shown.left(), None, "nothing is known yet");
+        assert_eq!(shown.left(), None, "unknown before the first generation");
         for generation in 1..=4 {
             shown.generation(small, generation);
         }
@@ -270,9 +278,9 @@ mod tests {
         assert_eq!(
             shown.share_left(),
             Some(4.0),
-            "the large one costs four times as much"
+            "the large run costs four times as much"
         );
-        // Two of its generations were done before, by another process.
+        // Two generations of the large run were completed before, by another process.
         shown.generation(large, 3);
         assert_eq!(shown.share_left(), Some(0.5));
         shown.generation(large, 4);

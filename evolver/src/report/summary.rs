@@ -1,4 +1,4 @@
-//! The summary of a run, and of a genome, for people.
+//! Summaries of a run and of a genome.
 
 use super::structures::{self, Classified};
 use crate::output::stdout_is_ascii;
@@ -13,7 +13,7 @@ use minimal_surprise_evolution::text::shell_path;
 use std::fmt::Write;
 use std::path::Path;
 
-/// The command that starts this program, for commands that people can copy.
+/// Returns the command that starts this program, for commands that users can copy.
 #[must_use]
 pub fn program() -> &'static str {
     if std::env::var_os("CARGO").is_some() {
@@ -23,7 +23,7 @@ pub fn program() -> &'static str {
     }
 }
 
-/// The result of an evolution, and what to do next.
+/// Formats the result of an evolution, and commands to run next.
 #[must_use]
 pub fn evolved(experiment: &Experiment, result: &EvolutionResult, directory: &Path) -> String {
     let settings = experiment.settings();
@@ -67,7 +67,7 @@ pub fn evolved(experiment: &Experiment, result: &EvolutionResult, directory: &Pa
     )
 }
 
-/// The contents of a genome file.
+/// Formats the contents of a genome file.
 #[must_use]
 pub fn genome(file: &GenomeFile) -> String {
     let (topology, provenance) = (file.topology(), file.provenance());
@@ -125,7 +125,7 @@ pub fn genome(file: &GenomeFile) -> String {
     text
 }
 
-/// A table of a network's weights.
+/// Writes a table of a network's weights.
 fn network(text: &mut String, name: &str, shape: Shape, weights: &[i16]) {
     let sizes = format!("{}-{}-{}", shape.inputs(), shape.hidden(), shape.outputs());
     let _ = writeln!(text, "\n{name:<19} {sizes}, {} weights", weights.len());

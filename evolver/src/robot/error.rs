@@ -1,10 +1,10 @@
-//! Errors in talking to a robot.
+//! Errors in the communication with a robot.
 
 use super::port_name::PortName;
 use minimal_surprise_controller::{KERNEL_ID, KernelId};
 use minimal_surprise_link::Refusal;
 
-/// A problem with a port or the robot behind it.
+/// A problem with a port or its robot, with the robot's resulting state.
 #[derive(Debug, thiserror::Error)]
 #[error("--port = {port}: {problem}{}", left.as_ref().map_or(String::new(), |left| format!("; {left}")))]
 pub struct RobotError {
@@ -19,13 +19,13 @@ pub struct RobotError {
 /// A problem with a port or a robot.
 #[derive(Debug, thiserror::Error)]
 pub enum Problem {
-    /// There is no port with this name.
+    /// The port does not exist.
     #[error("no such port; {}", present(ports))]
     NoSuchPort {
         /// The existing ports.
         ports: Vec<String>,
     },
-    /// The name is that of a file, folder or other device.
+    /// The name refers to a file, folder or other device.
     #[error(
         "not a serial port, but a file, folder or other device; {}",
         present(ports)
@@ -43,7 +43,7 @@ pub enum Problem {
     /// Another program uses the port.
     #[error("the port is in use by another program; close that first")]
     InUse,
-    /// The operating system refuses to open the port.
+    /// The operating system cannot open the port.
     #[error("the port cannot be opened: {0}")]
     NotOpened(serialport::Error),
     /// Nothing was received.
@@ -51,23 +51,23 @@ pub enum Problem {
         "silence for {seconds:.1} s; expected a robot that is switched on, at {baud} baud (--baud){reader}{RESTARTS}"
     )]
     Silent {
-        /// How long the program waited.
+        /// Time waited, in seconds.
         seconds: f64,
         /// The baud rate.
         baud: u32,
-        /// Whether another program may have read the answer.
+        /// Whether another program may have read the reply.
         reader: OtherReader,
     },
-    /// Bytes were received, but no answer of a robot.
+    /// Bytes were received, but no reply from a robot.
     #[error(
         "another device is talking: {heard}; expected a robot at {baud} baud (--baud){reader}{RESTARTS}"
     )]
     OtherDevice {
-        /// What was received.
+        /// The received data.
         heard: Heard,
         /// The baud rate.
         baud: u32,
-        /// Whether another program may have read the answer.
+        /// Whether another program may have read the reply.
         reader: OtherReader,
     },
     /// The robot uses different arithmetic.
@@ -79,37 +79,37 @@ pub enum Problem {
     /// The line failed, for example because it was unplugged.
     #[error("the line broke while the robot was {doing}: {error}{}", doing.consequence())]
     Broken {
-        /// What the robot was doing.
+        /// The robot's activity at that time.
         doing: Doing,
         /// The operating system's error.
         error: std::io::Error,
     },
-    /// The robot answered before, but no longer does.
+    /// The robot stopped answering.
     #[error("the robot stopped answering while it was {doing}{}{reader}", doing.consequence())]
     Unanswered {
-        /// What the robot was doing.
+        /// The robot's activity at that time.
         doing: Doing,
-        /// Whether another program may have read the answer.
+        /// Whether another program may have read the reply.
         reader: OtherReader,
     },
     /// The user interrupted the command.
     #[error("interrupted while the robot was {doing}{}", doing.consequence())]
     Interrupted {
-        /// What the robot was doing.
+        /// The robot's activity at that time.
         doing: Doing,
     },
-    /// The robot refused the request.
-    #[error("refused while the robot was {doing}: {refusal}{}", doing.consequence_of(*refusal))]
+    /// The robot rejected the request.
+    #[error("request rejected while the robot was {doing}: {refusal}{}", doing.consequence_of(*refusal))]
     Refused {
-        /// What the robot was doing.
+        /// The robot's activity at that time.
         doing: Doing,
         /// The robot's reason.
         refusal: Refusal,
     },
-    /// The answer is not to the request.
-    #[error("an answer to another request while the robot was {doing}")]
+    /// The reply does not match the request.
+    #[error("the reply does not match the request, while the robot was {doing}")]
     OtherAnswer {
-        /// What the robot was doing.
+        /// The robot's activity at that time.
         doing: Doing,
     },
     /// The robot reports values that are impossible.
@@ -121,12 +121,12 @@ pub enum Problem {
     /// The robot confirmed the genome, but does not run it.
     #[error("the robot confirmed the genome, but runs {runs}; run the command again")]
     NotInUse {
-        /// The genome that it runs.
+        /// The genome that the robot runs.
         runs: String,
     },
 }
 
-/// Ends a message about a robot that has not answered yet.
+/// The end of a message about a robot that has not answered yet.
 const RESTARTS: &str =
     "; a board that restarts when its port is opened may need longer, as with --wait 10";
 
@@ -135,7 +135,7 @@ const RESTARTS: &str =
 pub enum OtherReader {
     /// Possibly.
     Possible,
-    /// Certainly: bytes had arrived, but were gone when the program read them.
+    /// Certainly: bytes had arrived, but another program read them first.
     Certain,
 }
 
@@ -148,7 +148,7 @@ impl std::fmt::Display for OtherReader {
     }
 }
 
-/// What a robot is asked to do.
+/// The request that a robot is executing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doing {
     /// Identify itself.
@@ -166,7 +166,7 @@ pub enum Doing {
 }
 
 impl Doing {
-    /// The consequence for the robot, if it is not obvious.
+    /// Returns the consequence for the robot, or an empty text if it is obvious.
     fn consequence(self) -> &'static str {
         match self {
             Self::Receiving => "; it keeps its old genome",
@@ -177,9 +177,9 @@ impl Doing {
         }
     }
 
-    /// The consequence after a refusal. A refused genome is not in use. But after a lost session,
-    /// the request may have been carried out already; and a memory that could not be read may have
-    /// the genome after a restart.
+    /// Returns the consequence of a rejected request. A rejected genome is not in use. But after a
+    /// lost session, the request may have been executed already; and if the flash could not be
+    /// read, the robot may run the new genome after a restart.
     fn consequence_of(self, refusal: Refusal) -> &'static str {
         match (self, refusal) {
             (Self::Committing, Refusal::NoSession | Refusal::Flash) => self.consequence(),
@@ -202,21 +202,21 @@ impl std::fmt::Display for Doing {
     }
 }
 
-/// What was received instead of an answer.
+/// Received data that is not a reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// The bytes that were sent.
+    /// A copy of the bytes that were sent.
     Echo,
-    /// A message in another version of the protocol.
+    /// A message in a different version of the protocol.
     OtherVersion {
         /// The version.
         found: u8,
     },
-    /// Frames that are not answers.
+    /// Frames that are not replies.
     Frames,
     /// Bytes without a frame.
     Bytes {
-        /// How many.
+        /// Number of bytes.
         count: u64,
     },
 }
@@ -227,10 +227,10 @@ impl std::fmt::Display for Heard {
             Self::Echo => write!(f, "it only echoes what it is sent"),
             Self::OtherVersion { found } => write!(
                 f,
-                "it speaks version {found} of the protocol, this program version {}",
+                "it uses version {found} of the protocol, this program uses version {}",
                 minimal_surprise_link::PROTOCOL_VERSION
             ),
-            Self::Frames => write!(f, "its frames are not answers"),
+            Self::Frames => write!(f, "its frames are not replies"),
             Self::Bytes { count } => write!(f, "it sent {count} bytes without a message"),
         }
     }

@@ -1,21 +1,22 @@
-//! A robot that is stopped for some work and put back into its state afterwards.
+//! A robot that is stopped for some work and restored to its former state afterwards.
 
 use super::{Robot, RobotError};
 use std::sync::Mutex;
 
-/// The message to print if the program exits while it has stopped a robot.
+/// The message to print if the program exits while a robot is stopped.
 static STANDING: Mutex<Option<String>> = Mutex::new(None);
 
 /// The state of the robot after the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Afterwards {
-    /// Running if the work succeeded, otherwise as before.
+    /// Running if the work succeeded, otherwise unchanged.
     Runs,
-    /// As before, but with a reset controller, since the work has used it.
+    /// Unchanged, except that the controller is reset because the work has used it.
     StartsAnew,
 }
 
-/// What to tell the user if the program exits now: that a robot is stopped, and what starts it.
+/// Returns the message to print if the program exits now: that a robot is stopped, and the command
+/// that starts it.
 #[must_use]
 pub fn standing() -> Option<String> {
     STANDING.lock().ok().and_then(|words| words.clone())
@@ -23,11 +24,12 @@ pub fn standing() -> Option<String> {
 
 impl Robot {
     /// Stops the robot for some work. Afterwards, even after an interruption or a panic, the robot
-    /// is in its former state, or [`RobotError::left`] gives its state and says that
-    /// `start_command` starts it.
+    /// is in its former state, or [`RobotError::left`] describes its state and names
+    /// `start_command` as the command that starts it.
     ///
     /// # Errors
-    /// [`RobotError`] of stopping, of the work, or of putting the robot back.
+    /// [`RobotError`] if the robot cannot be stopped, the work fails, or the state cannot be
+    /// restored.
     pub fn while_stopped<T>(
         &mut self,
         afterwards: Afterwards,
@@ -49,7 +51,7 @@ impl Robot {
             held.runs = true;
         }
         if let Err(error) = held.put_back() {
-            // The first error caused the others.
+            // Report the first error, which caused the others.
             let mut error = done.err().unwrap_or(error);
             error.left = held.runs.then(|| held.words.clone());
             done = Err(error);
@@ -73,7 +75,7 @@ impl Held<'_> {
         self.robot.finish();
         let mut back = Ok(());
         if self.runs || self.starts_anew {
-            // In a new conversation: the robot may have restarted.
+            // Use a new conversation, since the robot may have restarted.
             back = self.robot.identify().map(|_| ());
             if self.starts_anew && !self.robot.identity.running {
                 back = back.and_then(|()| self.robot.reset());
@@ -88,7 +90,7 @@ impl Held<'_> {
 }
 
 impl Drop for Held<'_> {
-    /// After a panic.
+    /// Restores the robot's state after a panic.
     fn drop(&mut self) {
         if !self.is_back && self.put_back().is_err() && self.runs {
             tell!("{}", self.words);

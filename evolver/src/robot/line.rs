@@ -1,4 +1,4 @@
-//! One serial port, and one request after another over it.
+//! A serial port, and requests sent over it one at a time.
 
 use super::error::{Doing, Heard, OtherReader, Problem, RobotError};
 use super::port_name::PortName;
@@ -12,31 +12,31 @@ use std::time::{Duration, Instant};
 
 /// Time limit for sending a request; at 9,600 baud the longest takes 160 ms.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
-/// Pause before retrying a port that reported to be ready but was not.
+/// Pause before retrying a port that reported that it was ready but was not.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// For operations that must not be interrupted.
+/// A flag that is never set, for operations that must not be interrupted.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
-/// A port with a conversation.
+/// An open port and its conversation with a robot.
 pub(super) struct Line {
     name: PortName,
     baud: u32,
     port: Box<dyn SerialPort>,
     client: Client,
-    /// Bytes received in this conversation.
+    /// Number of bytes received in this conversation.
     received: u64,
-    /// Whether any answer was ever received.
+    /// Whether any reply was ever received.
     answered: bool,
-    /// Whether bytes had arrived but were gone when they were read.
+    /// Whether bytes had arrived but another program read them first.
     shared: bool,
     /// Set to stop sending requests.
     stop: &'static AtomicBool,
 }
 
 impl Line {
-    /// Opens the port; sends nothing yet. The first request is repeated for as long as `wait`. Once
-    /// `stop` is set, no request is sent any more.
+    /// Opens the port without sending anything. The first request is repeated for up to `wait`.
+    /// Once `stop` is set, no more requests are sent.
     pub(super) fn open(
         name: &PortName,
         baud: u32,
@@ -52,14 +52,14 @@ impl Line {
         if path.is_file() || path.is_dir() {
             return Err(about(Problem::NotAPort { ports: ports() }));
         }
-        // The serial library takes UTF-8 only.
+        // The serial library accepts only UTF-8.
         let text = path.to_str().ok_or_else(|| about(Problem::NotUtf8))?;
         let port = open_port(text, baud).map_err(|error| {
             about(match error.kind {
                 serialport::ErrorKind::Io(ErrorKind::NotFound) => {
                     Problem::NoSuchPort { ports: ports() }
                 }
-                // On Windows, also the error for a missing port.
+                // On Windows, this is also the error for a missing port.
                 serialport::ErrorKind::NoDevice if cfg!(unix) => Problem::InUse,
                 serialport::ErrorKind::Unknown if is_another_device(path) => {
                     Problem::NotAPort { ports: ports() }
@@ -81,7 +81,7 @@ impl Line {
         })
     }
 
-    /// Ignores `stop` from here on.
+    /// Ignores `stop` from this point.
     pub(super) fn finish(&mut self) {
         self.stop = &NEVER;
     }
@@ -92,7 +92,7 @@ impl Line {
         self.received = 0;
     }
 
-    /// Sends a request, repeatedly if necessary, until it is answered; `take` extracts the result.
+    /// Sends a request, repeatedly if necessary, until a reply arrives; `take` extracts the result.
     pub(super) fn ask<T>(
         &mut self,
         doing: Doing,
@@ -106,7 +106,8 @@ impl Line {
         let started = Instant::now();
         let mut bytes = match self.client.request(request) {
             Ok(bytes) => bytes.to_vec(),
-            // A request is always completed, and a conversation allows more than any run needs.
+            // Unreachable in practice: requests are always completed, and a conversation allows
+            // more of them than any run needs.
             Err(error) => {
                 let error = io::Error::other(error);
                 return Err(self.about(Problem::Broken { doing, error }));
@@ -151,7 +152,7 @@ impl Line {
         }
     }
 
-    /// Why there was no answer.
+    /// Returns the problem that explains a missing reply.
     fn silence(&self, doing: Doing, waited: Duration) -> Problem {
         let baud = self.baud;
         let reader = match self.shared {
@@ -187,7 +188,8 @@ impl Line {
         while !bytes.is_empty() {
             match self.by(deadline, |port| port.write(bytes)) {
                 Ok(Some(count)) => bytes = &bytes[count..],
-                // A line that accepts nothing does not answer either.
+                // A line that accepts no bytes will not reply either; the missing reply is
+                // reported.
                 Ok(None) => break,
                 Err(error) => return Err(self.broken(doing, error)),
             }
@@ -195,7 +197,7 @@ impl Line {
         Ok(())
     }
 
-    /// Bytes received; none at the deadline.
+    /// Receives bytes and returns their number; `None` at the deadline.
     fn receive(
         &mut self,
         doing: Doing,
@@ -212,7 +214,7 @@ impl Line {
         read.map_err(|error| self.broken(doing, error))
     }
 
-    /// Reads or writes as soon as possible; nothing at the deadline.
+    /// Reads or writes as soon as possible; returns `None` at the deadline.
     fn by(
         &mut self,
         deadline: Instant,
@@ -239,8 +241,8 @@ impl Line {
     }
 }
 
-/// Whether a port that was ready transferred nothing. An unplugged line does the same, but then
-/// reports an error instead of being ready.
+/// Returns whether a port that was ready transferred nothing. An unplugged line also transfers
+/// nothing, but then reports an error instead of being ready.
 fn is_not_ready(transferred: &io::Result<usize>) -> bool {
     match transferred {
         Ok(count) => *count == 0,
@@ -248,12 +250,13 @@ fn is_not_ready(transferred: &io::Result<usize>) -> bool {
     }
 }
 
-/// A port that never waits during a read or write, only before it. Otherwise, if another program
-/// took the byte that had arrived, the read would wait for the next one without a time limit.
+/// Opens a port that waits only before a read or write, never during it. Otherwise, if another
+/// program took the byte that had arrived, the read would wait for the next one without a time
+/// limit.
 #[cfg(unix)]
 fn open_port(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
     let port = serialport::new(name, baud).open_native()?;
-    // The setting belongs to the open file, which the duplicate shares.
+    // The flag belongs to the open file, which both descriptors share.
     let set = filedescriptor::FileDescriptor::dup(&port)
         .and_then(|mut duplicate| duplicate.set_non_blocking(true));
     match set {
@@ -281,7 +284,7 @@ fn is_another_device(_: &Path) -> bool {
     false
 }
 
-/// A port whose reads and writes have a time limit.
+/// Opens a port whose reads and writes have a time limit.
 #[cfg(not(unix))]
 fn open_port(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
     serialport::new(name, baud).timeout(SEND_TIMEOUT).open()
@@ -298,7 +301,7 @@ pub(super) fn is_lost_session(problem: &Problem) -> bool {
     )
 }
 
-/// The names of the ports that the operating system lists.
+/// Returns the names of the ports that the operating system lists.
 fn ports() -> Vec<String> {
     let ports = serialport::available_ports().unwrap_or_default();
     ports.into_iter().map(|port| port.port_name).collect()

@@ -1,4 +1,4 @@
-//! A robot on a serial line: identifying it, writing its genome, steps, telemetry.
+//! A robot on a serial line: identification, genome transfer, single steps, telemetry.
 //!
 //! This module adds the port, the clock and the retries that [`minimal_surprise_link`] leaves to
 //! the host.
@@ -24,18 +24,18 @@ use std::fmt;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// A robot's firmware, and what it runs.
+/// A robot's firmware and state.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity {
     /// Name and version of the firmware.
     pub firmware: String,
-    /// Its arithmetic.
+    /// The firmware's arithmetic.
     pub kernel: KernelId,
     /// The genome in use.
     pub genome: GenomeInUse,
     /// Whether the control loop runs.
     pub running: bool,
-    /// Its faults.
+    /// The robot's faults.
     pub faults: Faults,
 }
 
@@ -51,7 +51,7 @@ impl fmt::Display for Identity {
     }
 }
 
-/// The genome in use, in words.
+/// Describes the genome in use.
 #[must_use]
 pub fn describe(genome: GenomeInUse) -> String {
     match genome {
@@ -65,7 +65,7 @@ pub fn describe(genome: GenomeInUse) -> String {
     }
 }
 
-/// The faults, in words.
+/// Returns a description of each fault.
 #[must_use]
 pub fn fault_names(faults: Faults) -> Vec<&'static str> {
     let names = [
@@ -85,8 +85,8 @@ pub fn fault_names(faults: Faults) -> Vec<&'static str> {
     set.map(|(_, name)| name).chain(unknown).collect()
 }
 
-/// Length and CRC of a container, by which a robot identifies the genome in use; `None` for bytes
-/// that cannot be a container.
+/// Returns the length and CRC of a container, by which a robot identifies the genome in use; `None`
+/// if the bytes cannot be a container.
 #[must_use]
 pub fn length_and_crc(container: &[u8]) -> Option<(u16, u32)> {
     let (_, crc) = container.split_last_chunk()?;
@@ -107,18 +107,18 @@ pub fn is_in_use(genome: GenomeInUse, container: &[u8]) -> bool {
 pub struct Robot {
     line: Line,
     identity: Identity,
-    /// Steps requested since the last reset.
+    /// Number of steps requested since the last reset.
     steps: u64,
-    /// Its last report in this conversation.
+    /// The robot's last report in this conversation.
     reported: Option<Surprise>,
 }
 
 impl Robot {
-    /// Opens the port and asks the robot to identify itself, for as long as `wait`. Once `stop` is
-    /// set, only the requests that restore the robot's state are sent.
+    /// Opens the port and asks the robot to identify itself, for up to `wait`. Once `stop` is set,
+    /// only the requests that restore the robot's state are sent.
     ///
     /// # Errors
-    /// [`RobotError`] if there is no such port, nothing answers, or another device does.
+    /// [`RobotError`] if the port does not exist, nothing answers, or a different device answers.
     pub fn connect(
         port: &PortName,
         baud: u32,
@@ -135,21 +135,21 @@ impl Robot {
         })
     }
 
-    /// Ignores `stop` from here on.
+    /// Ignores `stop` from this point.
     fn finish(&mut self) {
         self.line.finish();
     }
 
-    /// Its last identification.
+    /// Returns the robot's last identification.
     #[must_use]
     pub fn identity(&self) -> &Identity {
         &self.identity
     }
 
-    /// Identifies it again, in a new conversation.
+    /// Identifies the robot again, in a new conversation.
     ///
     /// # Errors
-    /// [`RobotError`].
+    /// [`RobotError`] if the robot does not answer or rejects the request.
     pub fn identify(&mut self) -> Result<&Identity, RobotError> {
         self.line.start_over();
         self.reported = None;
@@ -157,10 +157,10 @@ impl Robot {
         Ok(&self.identity)
     }
 
-    /// Refuses a robot that uses different arithmetic.
+    /// Rejects a robot that uses different arithmetic.
     ///
     /// # Errors
-    /// [`Problem::OtherKernel`].
+    /// [`Problem::OtherKernel`] if the robot's kernel differs from this program's.
     pub fn check_kernel(&self) -> Result<(), RobotError> {
         let robot = self.identity.kernel;
         if robot == KERNEL_ID {
@@ -175,8 +175,8 @@ impl Robot {
     /// until the genome is complete.
     ///
     /// # Errors
-    /// [`RobotError`]; the robot then keeps its genome, except after [`Doing::Committing`], when it
-    /// has either genome.
+    /// [`RobotError`] if the transfer fails. The robot then keeps its old genome, except after a
+    /// failure while [`Doing::Committing`], when it has either genome.
     pub fn write(
         &mut self,
         container: &[u8],
@@ -202,7 +202,7 @@ impl Robot {
                 _ => None,
             });
         match committed {
-            // The answer may have been lost: ask the robot.
+            // The reply may have been lost, so ask the robot.
             Err(error) if matches!(error.problem, Problem::Unanswered { .. }) => {
                 self.identify().map_err(|_| error)?;
             }
@@ -222,7 +222,7 @@ impl Robot {
     /// Starts the control loop.
     ///
     /// # Errors
-    /// [`RobotError`].
+    /// [`RobotError`] if the robot does not answer or rejects the request.
     pub fn start(&mut self) -> Result<(), RobotError> {
         self.done(Doing::Switching, &Request::Start)
     }
@@ -230,7 +230,7 @@ impl Robot {
     /// Stops the motors and the control loop.
     ///
     /// # Errors
-    /// [`RobotError`].
+    /// [`RobotError`] if the robot does not answer or rejects the request.
     pub fn stop(&mut self) -> Result<(), RobotError> {
         self.done(Doing::Switching, &Request::Stop)
     }
@@ -238,7 +238,7 @@ impl Robot {
     /// Resets the controller. The robot must be stopped.
     ///
     /// # Errors
-    /// [`RobotError`].
+    /// [`RobotError`] if the robot does not answer or rejects the request.
     pub fn reset(&mut self) -> Result<(), RobotError> {
         self.steps = 0;
         self.done(Doing::Switching, &Request::Reset)
@@ -247,7 +247,7 @@ impl Robot {
     /// Makes one control step with these readings. The robot must be stopped and have been reset.
     ///
     /// # Errors
-    /// [`RobotError`].
+    /// [`RobotError`] if the robot does not answer or rejects the request.
     pub fn step(&mut self, sensors: SensorBits) -> Result<Stepped, RobotError> {
         let request = Request::Step { sensors };
         let stepped = self
@@ -261,10 +261,10 @@ impl Robot {
         Ok(stepped)
     }
 
-    /// Its telemetry; `None` if the robot restarted since the last request.
+    /// Returns the robot's telemetry; `None` if the robot restarted since the last request.
     ///
     /// # Errors
-    /// [`RobotError`].
+    /// [`RobotError`] if the robot does not answer or rejects the request.
     pub fn telemetry(&mut self) -> Result<Option<(Report, LineCounters)>, RobotError> {
         let told = self
             .line
@@ -296,14 +296,14 @@ impl Robot {
         checked.map_err(|what| self.line.about(Problem::Impossible { what }))
     }
 
-    /// Sends a request whose answer only confirms it.
+    /// Sends a request whose reply is only a confirmation.
     fn done(&mut self, doing: Doing, request: &Request<'_>) -> Result<(), RobotError> {
         self.line
             .ask(doing, request, |reply| (reply == Reply::Done).then_some(()))
     }
 }
 
-/// The difference between two reports; `None` if the counts were reset in between.
+/// Returns the difference between two reports; `None` if the counts were reset in between.
 #[must_use]
 pub fn since(before: Surprise, now: Surprise) -> Option<Surprise> {
     Some(Surprise {
@@ -332,7 +332,7 @@ fn identify(line: &mut Line) -> Result<Identity, RobotError> {
     identity.map_err(|what| line.about(Problem::Impossible { what }))
 }
 
-/// Name and version, without terminal control characters.
+/// Joins name and version, and escapes terminal control characters.
 fn printable(firmware: &str, version: &str) -> String {
     terminal(&format!("{firmware} {version}"))
 }

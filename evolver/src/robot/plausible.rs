@@ -1,19 +1,19 @@
-//! Checks whether a robot's reports are possible, before anything is computed from them.
-//!
-//! Not checked, since nothing is computed from them: the write count of a commit, after which the
-//! robot is asked for the genome in use; the counters of the line, which can have any value and are
-//! shown unchanged; the offset that a refused chunk should have had, which the message names.
+//! Checks that the values reported by a robot are possible, before they are used. Some values are
+//! not checked, since nothing is computed from them: the write count in the reply to a commit,
+//! after which the robot is asked for the genome in use; the counters of the line, which can have
+//! any value and are shown unchanged; and the expected offset in the rejection of a chunk, which is
+//! shown in the message.
 
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_controller::{KERNEL_ID, Surprise};
 use minimal_surprise_link::{FIRMWARE_BYTES_MAX, GenomeInUse, Identity, Report, VERSION_BYTES_MAX};
 
-/// Maximum number of bits sensed in a step: those of a reading.
+/// Maximum number of bits sensed in a step: the bits of one reading.
 const BITS_A_STEP_MAX: u64 = u16::BITS as u64;
-/// A container is longer than its CRC.
+/// Bytes of the CRC; a container is longer.
 const CRC_BYTES: u16 = 4;
 
-/// Refuses an impossible identity, and says why.
+/// Rejects an impossible identity, with the reason.
 pub(super) fn check_identity(identity: &Identity<'_>) -> Result<(), String> {
     for (what, text, most) in [
         ("firmware name", identity.firmware, FIRMWARE_BYTES_MAX),
@@ -22,7 +22,7 @@ pub(super) fn check_identity(identity: &Identity<'_>) -> Result<(), String> {
         if text.len() > most {
             let found = text.len();
             return Err(format!(
-                "{what}: {found} bytes, and at most {most} are allowed"
+                "{what}: {found} bytes, but at most {most} are allowed"
             ));
         }
     }
@@ -35,15 +35,15 @@ pub(super) fn check_identity(identity: &Identity<'_>) -> Result<(), String> {
     else {
         return Ok(());
     };
-    // The needs of a different kernel's genomes are unknown here.
+    // The length limit of a different kernel's genomes is unknown.
     let most = match identity.kernel {
         KERNEL_ID => CONTAINER_BYTES_MAX as u16,
         _ => u16::MAX,
     };
     if slot > 1 {
-        Err(format!("slot: {slot}, and a robot has slots 0 and 1"))
+        Err(format!("slot: {slot}, but a robot has slots 0 and 1"))
     } else if write_count == 0 {
-        Err("write count: 0, and the first genome is number 1".to_owned())
+        Err("write count: 0, but the first genome is number 1".to_owned())
     } else if !(CRC_BYTES + 1..=most).contains(&length) {
         Err(format!("length of a genome: {length} bytes"))
     } else {
@@ -51,7 +51,7 @@ pub(super) fn check_identity(identity: &Identity<'_>) -> Result<(), String> {
     }
 }
 
-/// Refuses an impossible surprise after this many steps (if known), and says why.
+/// Rejects an impossible surprise, with the reason; `steps` is the number of steps, if known.
 pub(super) fn check_surprise(surprise: Surprise, steps: Option<u64>) -> Result<(), String> {
     let Surprise {
         mispredicted_bits: mispredicted,
@@ -70,10 +70,10 @@ pub(super) fn check_surprise(surprise: Surprise, steps: Option<u64>) -> Result<(
     }
 }
 
-/// Refuses an impossible report, and says why.
+/// Rejects an impossible report, with the reason.
 pub(super) fn check_report(report: &Report) -> Result<(), String> {
     let counts = [report.straight, report.turned_left, report.turned_right];
-    // A counter stops at its largest value.
+    // A counter at its maximum may have missed steps.
     let steps = (!counts.contains(&u32::MAX)).then(|| counts.map(u64::from).iter().sum());
     check_surprise(report.surprise, steps)?;
     if report.held_back > report.straight {

@@ -4,7 +4,7 @@ use minimal_surprise_evolution::text::terminal_path;
 use std::fmt;
 use std::path::PathBuf;
 
-/// A port, as the user names it.
+/// Port name, as given by the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PortName(pub PathBuf);
 

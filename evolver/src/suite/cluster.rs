@@ -1,6 +1,6 @@
-//! A job for a cluster: a submission has a folder of its own in the suite's directory, with copies of
-//! the program and the suite. A task that waits in the queue meets neither edited ones nor those of a
-//! later submission.
+//! Jobs for a cluster. Each submission has a separate folder in the suite's directory, with copies
+//! of the program and the suite, so that later edits and submissions do not affect tasks that wait
+//! in the queue.
 
 use minimal_surprise_evolution::files::{self, FileError};
 use minimal_surprise_evolution::new_dir::{NewDir, remove_abandoned};
@@ -8,13 +8,13 @@ use minimal_surprise_evolution::text::{shell_path, shell_word};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Folder of the submissions, in the suite's directory; each has a number.
+/// Folder of the numbered submissions, in the suite's directory.
 const JOBS: &str = "jobs";
-/// The suite's copy.
+/// File name of the suite's copy.
 const SUITE_FILE: &str = "suite.toml";
-/// The program's copy.
+/// File name of the program's copy.
 const PROGRAM: &str = "evolver";
-/// The job script.
+/// File name of the job script.
 pub(super) const SCRIPT: &str = "job.sh";
 
 /// Runs of a suite as tasks of a cluster.
@@ -22,9 +22,9 @@ pub(super) const SCRIPT: &str = "job.sh";
 pub struct Job<'a> {
     /// Name of the suite.
     pub name: &'a str,
-    /// The suite's directory, absolute.
+    /// Absolute path of the suite's directory.
     pub directory: &'a Path,
-    /// Tasks.
+    /// Number of tasks.
     pub shards: u32,
     /// Maximum number of tasks at once.
     pub at_once: Option<u32>,
@@ -33,15 +33,15 @@ pub struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// The folder of the next submission.
+    /// Returns the folder of the next submission.
     pub(super) fn next_folder(&self) -> PathBuf {
         let jobs = self.directory.join(JOBS);
         let mut next = (1_u32..).map(|number| jobs.join(number.to_string()));
         let free = next.find(|folder| folder.symlink_metadata().is_err());
-        free.expect("there are more numbers than folders")
+        free.expect("a free number exists")
     }
 
-    /// The command of one task; `shard` is its index, as the script knows it.
+    /// Returns the command of one task; `shard` is the task's index in shell syntax.
     pub(super) fn command(&self, folder: &Path, shard: &str) -> String {
         let flags = self
             .flags
@@ -58,7 +58,7 @@ impl Job<'_> {
         )
     }
 
-    /// Writes what the tasks need into the folder of a new submission.
+    /// Writes the files that the tasks need to the folder of a new submission.
     pub(super) fn write(
         &self,
         suite_text: &str,
@@ -68,7 +68,7 @@ impl Job<'_> {
         loop {
             let folder = self.next_folder();
             match write(&folder, suite_text, &script(&folder)) {
-                // Another submission has taken the number meanwhile.
+                // A concurrent submission has taken the number; try the next.
                 Err(error) if error.is_exists() => {}
                 written => return written.map(|()| folder),
             }

@@ -1,7 +1,6 @@
-//! An experiment of a suite: the table `[[experiment]]`, and its combinations of settings.
-//!
-//! Besides its own keys the table has one for every setting that a suite may list, with one value or
-//! several.
+//! Experiments of a suite: the table `[[experiment]]`, and its combinations of settings. In
+//! addition to its own keys, the table has a key for every setting that a suite may list, with one
+//! value or several.
 
 use minimal_surprise_controller::Prediction;
 use minimal_surprise_evolution::settings::{
@@ -12,31 +11,31 @@ use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Evolutions under every combination of the listed values of settings.
+/// Evolutions with every combination of the listed values of settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExperimentTable {
-    /// Its name.
+    /// Name of the experiment.
     pub name: String,
-    /// Runs of every combination, seeds from [`ExperimentTable::first_seed`] on.
+    /// Number of runs per combination, with consecutive seeds from [`ExperimentTable::first_seed`].
     pub runs: u32,
     /// Predictions: `free`, the name of a template, or `partly-line`.
     pub predictions: Vec<String>,
     /// Seed of the first run.
     pub first_seed: u64,
-    /// Whether it is left out unless it is asked for by name.
+    /// Whether the experiment is left out unless requested.
     pub optional: bool,
-    /// Values of other settings, by their names.
+    /// Values of other settings, by setting name.
     values: BTreeMap<&'static str, Vec<String>>,
 }
 
-/// Predictions that no template fixes.
+/// Name for predictions that are not fixed by a template.
 const FREE: &str = "free";
 
-/// Settings that every label has.
+/// Settings that labels handle separately.
 const LABELLED: [&str; 4] = ["grid", "robots", "sensor-model", "noise"];
 
 impl ExperimentTable {
-    /// The settings that it gives values of, the fastest varying first, with these values.
+    /// Returns the listed settings with their values; the fastest varying comes first.
     pub fn lists(&self) -> impl Iterator<Item = (&'static Setting, &[String])> {
         let first = ["noise", "robots", "grid", "sensor-model"];
         let others = self.values.keys().copied();
@@ -45,7 +44,7 @@ impl ExperimentTable {
         names.filter_map(|name| Some((setting(name)?, self.values.get(name)?.as_slice())))
     }
 
-    /// Number of combinations of the listed values.
+    /// Returns the number of combinations of the listed values.
     pub(super) fn combinations(&self) -> u64 {
         self.lists()
             .map(|(_, values)| values.len())
@@ -58,8 +57,8 @@ impl ExperimentTable {
         robots.filter_map(|robots| robots.parse().ok()).min()
     }
 
-    /// The settings of one combination: noise varies fastest, then robots, grids, predictions, models,
-    /// then whatever else is listed.
+    /// Returns the settings of one combination: noise varies fastest, then robots, grids,
+    /// predictions, models, then the other listed settings.
     pub(super) fn settings(&self, combination: u64) -> Result<Settings, SettingError> {
         let mut rest = combination;
         let mut next = |values: usize| {
@@ -82,8 +81,8 @@ impl ExperimentTable {
         Settings::resolve(&overrides, || self.first_seed)
     }
 
-    /// What distinguishes settings, in words: model, predictions, grid, swarm size and noise, and
-    /// whatever else the experiment has several values of.
+    /// Describes settings by model, predictions, grid, swarm size and noise, and by every other
+    /// setting with several values in the experiment.
     pub(super) fn label(&self, settings: &Settings) -> String {
         let (scenario, noise) = (settings.scenario(), settings.noise());
         let model = model_name(settings.topology().model()).to_uppercase();
@@ -114,10 +113,10 @@ impl ExperimentTable {
     }
 }
 
-/// Keys that are no settings.
+/// Keys that are not settings.
 const OWN: [&str; 5] = ["name", "runs", "predictions", "first-seed", "optional"];
 
-/// Settings that every experiment lists, because runs are labelled with them.
+/// Settings that every experiment lists, at least with their defaults, because they label runs.
 const ALWAYS: [&str; 4] = ["grid", "robots", "sensor-model", "noise"];
 
 /// A key of an experiment.
@@ -146,7 +145,7 @@ impl<'de> Deserialize<'de> for Key {
     }
 }
 
-/// One value or several, as text.
+/// One or several values, as text.
 struct Values(Vec<String>);
 
 impl<'de> Deserialize<'de> for Values {

@@ -1,4 +1,4 @@
-//! The file of a suite: what is to be evolved, evaluated again and damaged.
+//! The file of a suite: experiments, re-evaluations and damage experiments.
 
 use super::experiment::ExperimentTable;
 use minimal_surprise_evolution::files::{self, FileError, TEXT_BYTES_MAX};
@@ -10,18 +10,18 @@ use std::path::{Path, PathBuf};
 /// The suite of the paper's experimental section.
 pub const PAPER: &str = include_str!("paper.toml");
 
-/// A suite as it is written.
+/// A suite, as written in its file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Suite {
-    /// Its name.
+    /// Name of the suite.
     pub name: String,
-    /// What its numbers are compared with in the report.
+    /// Numbers to compare with in the report.
     pub compare_with: Option<Reference>,
-    /// Its evolutions.
+    /// Evolutions.
     #[serde(default, rename = "experiment")]
     pub experiments: Vec<ExperimentTable>,
-    /// Its best genomes, run again from new starts.
+    /// Re-evaluations of the best genomes from new starts.
     #[serde(default, rename = "re-evaluation")]
     pub reevaluations: Vec<Reevaluation>,
     /// Damage experiments on the suite's structures.
@@ -29,49 +29,50 @@ pub struct Suite {
     pub resiliences: Vec<Resilience>,
 }
 
-/// Numbers to compare with.
+/// Source of numbers to compare with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reference {
-    /// Those of the paper's tables.
+    /// The paper's tables and text.
     Paper,
 }
 
-/// Best genomes of some experiments, from new starts.
+/// Re-evaluation of the best genomes of some experiments from new starts.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Reevaluation {
-    /// Its name.
+    /// Name of the re-evaluation.
     pub name: String,
     /// The experiments.
     pub of: Vec<String>,
-    /// New starts of each genome.
+    /// Number of new starts per genome.
     pub starts: u32,
 }
 
-/// A structure that evolved in an experiment, damaged.
+/// A damage experiment on a structure that evolved in another experiment.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Resilience {
-    /// Its name.
+    /// Name of the damage experiment.
     pub name: String,
-    /// The experiment.
+    /// Name of the experiment that evolved the structure.
     pub of: String,
-    /// The structure, by its name in tables, or with dashes.
+    /// Name of the structure, with spaces or dashes.
     pub structure: String,
-    /// Robots in each of the areas.
+    /// Number of robots in each area.
     pub robots_in_areas: Vec<u32>,
-    /// Runs of what is drawn at random.
+    /// Number of runs per row that involves random draws.
     pub repeat: u32,
-    /// If no run of the experiment has the structure: most further runs until one has it.
+    /// Maximum number of further runs, evolved until one has the structure if no planned run has
+    /// it.
     #[serde(default)]
     pub further_runs: u32,
 }
 
-/// Maximum number of areas of a resilience: they are called A to Z.
+/// Maximum number of areas of a damage experiment: they are named A to Z.
 const AREAS_MAX: usize = 26;
 
-/// Maximum of anything that is counted in a suite, as on the command line.
+/// Maximum of every count in a suite, the same as on the command line.
 const COUNT_MAX: u32 = 1_000_000;
 
 fn check_count(key: &str, value: u32) -> Result<(), String> {
@@ -83,7 +84,8 @@ fn check_count(key: &str, value: u32) -> Result<(), String> {
     ))
 }
 
-/// A name is shown, typed, and made into names of files; `...` and blanks say nothing.
+/// Checks a name: it must have visible characters, since it is printed, typed, and converted to
+/// file names.
 fn check_name(name: &str) -> Result<(), String> {
     if let Some(hidden) = name.chars().find(|&c| is_hidden(c)) {
         return Err(format!(
@@ -108,13 +110,16 @@ fn check_of(of: &str, names: &[&str]) -> Result<(), String> {
     if names.contains(&of) {
         return Ok(());
     }
-    Err(format!("of = {of:?}: experiments are {}", names.join(", ")))
+    Err(format!(
+        "of = {of:?}: expected one of the experiments: {}",
+        names.join(", ")
+    ))
 }
 
-/// Maximum number of combinations of settings of a suite; of each, there may be many runs.
+/// Maximum number of combinations of settings in a suite; each may have many runs.
 const COMBINATIONS_MAX: u64 = 1_000_000;
 
-/// Adds an experiment's combinations to those before it.
+/// Adds an experiment's combinations to the sum, and checks the sum.
 pub(super) fn check_combinations(
     experiment: &ExperimentTable,
     sum: &mut u64,
@@ -124,12 +129,12 @@ pub(super) fn check_combinations(
         return Ok(());
     }
     Err(format!(
-        "the listed values make {sum} combinations with those of the experiments before; expected at \
+        "the experiments up to this one have {sum} combinations of listed values; expected at \
          most {COMBINATIONS_MAX} in a suite"
     ))
 }
 
-/// Seeds after the first one have to be there.
+/// Checks that no seed of the runs exceeds the maximum.
 pub(super) fn check_seeds(first_seed: u64, runs: u32) -> Result<(), String> {
     match first_seed.checked_add(u64::from(runs)) {
         Some(_) => Ok(()),
@@ -140,7 +145,7 @@ pub(super) fn check_seeds(first_seed: u64, runs: u32) -> Result<(), String> {
     }
 }
 
-/// Checks an experiment, and adds its combinations to those before it.
+/// Checks an experiment, and adds its combinations to the sum.
 fn check_experiment(experiment: &ExperimentTable, combinations: &mut u64) -> Result<(), String> {
     check_name(&experiment.name)?;
     check_count("runs", experiment.runs)?;
@@ -165,22 +170,22 @@ impl Reevaluation {
     }
 }
 
-/// A suite cannot be used.
+/// The reason why a suite cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SuiteError {
     /// The file cannot be read.
     #[error(transparent)]
     Unreadable(#[from] FileError),
-    /// It is not a suite; the message has the place.
+    /// The file is not a valid suite; the message contains the line and column.
     #[error("{}: {error}", path.display())]
     Toml {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         error: Box<toml::de::Error>,
     },
-    /// It has nothing to do.
+    /// The suite has no experiments.
     #[error("{}: no [[experiment]]: expected at least one", path.display())]
     NoExperiment {
         /// The file.
@@ -191,7 +196,7 @@ pub enum SuiteError {
     Name {
         /// The file.
         path: PathBuf,
-        /// What is wrong and what would be valid.
+        /// The problem and the valid values.
         problem: String,
     },
     /// A value is not valid.
@@ -201,13 +206,13 @@ pub enum SuiteError {
         path: PathBuf,
         /// The experiment.
         experiment: String,
-        /// What is wrong and what would be valid.
+        /// The problem and the valid values.
         problem: String,
     },
 }
 
 impl Resilience {
-    /// The structure; none if the name is unknown.
+    /// Returns the structure; `None` if the name is unknown.
     #[must_use]
     pub fn structure(&self) -> Option<Structure> {
         let spaced = self.structure.replace('-', " ");
@@ -221,7 +226,7 @@ impl Resilience {
         if self.structure().is_none() {
             let names = Structure::ALL.map(Structure::name).join(", ");
             return Err(format!(
-                "structure = {:?}: structures are {names}",
+                "structure = {:?}: expected one of: {names}",
                 self.structure
             ));
         }
@@ -233,14 +238,14 @@ impl Resilience {
             ));
         }
         let of = experiments.iter().filter(|e| e.name == self.of);
-        // Some robot has to be left.
+        // At least one robot must remain.
         let smallest = of.filter_map(ExperimentTable::smallest_swarm).min();
         let most = smallest.map_or(0, |robots| robots - 1);
         for &robots in &self.robots_in_areas {
             if !(1..=most).contains(&robots) {
                 return Err(format!(
-                    "robots-in-areas = {:?}: {robots}: expected from 1 to {most}, fewer than the \
-                     smallest swarm of {:?} has",
+                    "robots-in-areas = {:?}: {robots}: expected from 1 to {most}, less than the \
+                     smallest swarm size of {:?}",
                     self.robots_in_areas, self.of
                 ));
             }
@@ -250,26 +255,26 @@ impl Resilience {
 }
 
 impl Suite {
-    /// The paper's suite.
+    /// Parses the paper's suite.
     ///
     /// # Errors
-    /// None: a test holds it to be well-formed.
+    /// Never; a test checks that the suite is valid.
     pub fn paper() -> Result<Self, SuiteError> {
         Self::parse(Path::new("paper.toml"), PAPER)
     }
 
-    /// Reads a suite.
+    /// Reads a suite file.
     ///
     /// # Errors
-    /// [`SuiteError`] names the file and the place in it.
+    /// [`SuiteError`] if the file cannot be read or is invalid; the message contains the position.
     pub fn read(path: &Path) -> Result<Self, SuiteError> {
         Self::parse(path, &files::read_text(path, TEXT_BYTES_MAX)?)
     }
 
-    /// Reads a suite's text; the path is for errors.
+    /// Parses a suite's text; `path` is used only in errors.
     ///
     /// # Errors
-    /// [`SuiteError`] names the file and the place in it.
+    /// [`SuiteError`] if the file cannot be read or is invalid; the message contains the position.
     pub fn parse(path: &Path, text: &str) -> Result<Self, SuiteError> {
         let suite: Self = toml::from_str(text).map_err(|error| SuiteError::Toml {
             path: path.to_owned(),
@@ -356,7 +361,7 @@ mod tests {
             "{hexagon}"
         );
         let of = "[[re-evaluation]]\nname = \"again\"\nof = [\"two\"]\nstarts = 3\n";
-        assert!(error(&format!("{head}{of}")).contains("experiments are one"));
+        assert!(error(&format!("{head}{of}")).contains("expected one of the experiments: one"));
     }
 
     #[test]

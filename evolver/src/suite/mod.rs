@@ -1,8 +1,8 @@
-//! Suites: many evolutions described as data, the paper's among them.
-//!
-//! A suite is a TOML file. Every combination of the values that an experiment lists is run `runs`
-//! times. [`plan`] makes runs with names of it, [`work`] does one of them, [`worker`] does those that
-//! are not done, [`search`] evolves further seeds until a wanted structure forms, [`status`] counts.
+//! Suites: many evolutions described as data, including the paper's. A suite is a TOML file. Every
+//! combination of an experiment's listed values is run `runs` times. [`plan`] converts a suite to
+//! named runs, [`work`] executes one run, [`worker`] executes all runs that are not done,
+//! [`search`] evolves further seeds until a wanted structure forms, and [`status`] counts the
+//! completed runs.
 //!
 //! ```toml
 //! name = "densities"

@@ -1,12 +1,10 @@
-//! Plans: the runs of a suite, each named by what it computes.
-//!
-//! A run's name is a hash of everything that its result depends on: the kernel, the version of
-//! what is computed with it, and the resolved settings with the seed. So finished work is found
-//! again and never mixed up, and experiments that ask for the same run share it.
-//!
-//! A plan holds no run. It knows which settings come in which order, and which seeds of theirs no
-//! earlier settings have; runs are made one by one as they are asked for, so that a plan of a
-//! million runs, or a share of it, takes no more memory than one of ten.
+//! Plans: the runs of a suite, each named by a hash of its inputs. A run's ID is a hash of
+//! everything that the run's result depends on: the kernel, the version of the evolution, and the
+//! resolved settings including the seed. Finished runs are therefore found reliably, and
+//! experiments that include the same run share it. A plan does not store its runs. It stores the
+//! order of the settings, and for each the seeds that no earlier equal settings have. Runs are
+//! created one at a time on request, so that a plan of a million runs, or a share of it, takes no
+//! more memory than a plan of ten.
 
 use super::experiment::ExperimentTable;
 use super::file::{Suite, check_combinations, check_seeds};
@@ -22,19 +20,19 @@ use std::path::{Path, PathBuf};
 pub struct Plan {
     /// Name of the suite.
     pub suite: String,
-    /// Its experiments.
+    /// The planned experiments.
     pub experiments: Vec<PlannedExperiment>,
-    /// Every run once, in order.
+    /// Every run once, in order, as ranges of seeds.
     different: Vec<SeedRange>,
 }
 
-/// Runs with the same settings, with seeds that follow each other.
+/// Runs with the same settings and consecutive seeds.
 #[derive(Clone, Copy, Debug)]
 struct SeedRange {
     experiment: u32,
-    /// Which of the experiment's settings.
+    /// Index of the settings among the experiment's combinations.
     combination: u32,
-    /// The first run, counted from the experiment's first seed.
+    /// Index of the first run, counted from the experiment's first seed.
     first: u32,
     runs: u32,
 }
@@ -42,20 +40,20 @@ struct SeedRange {
 /// The runs of an experiment.
 #[derive(Clone, Debug)]
 pub struct PlannedExperiment {
-    /// Its name.
+    /// Name of the experiment.
     pub name: String,
-    /// Its place in the plan.
+    /// Index of the experiment in the plan.
     index: usize,
-    /// What is planned, with the number of runs asked for.
+    /// The experiment, with the requested number of runs.
     asked: ExperimentTable,
 }
 
 /// The runs with the same settings.
 #[derive(Clone, Debug)]
 pub struct PlannedSettings {
-    /// What distinguishes them: model, predictions, grid, swarm size, noise.
+    /// Label of the settings: model, predictions, grid, swarm size, noise.
     pub label: String,
-    /// The settings, with the first seed.
+    /// The settings, including the first seed.
     pub settings: Settings,
     /// Number of runs.
     pub number: u32,
@@ -66,21 +64,21 @@ pub struct PlannedSettings {
 /// One run.
 #[derive(Clone, Debug)]
 pub struct PlannedRun {
-    /// Its name, and that of its directory.
+    /// Run ID, also the name of the run's directory.
     pub id: String,
-    /// What distinguishes its settings.
+    /// Label of the settings.
     pub label: String,
-    /// Its seed.
+    /// Seed of the run.
     pub seed: u64,
-    /// Everything else.
+    /// All settings of the run.
     pub settings: Settings,
-    /// The first experiment that has it.
+    /// Index of the first experiment that includes the run.
     experiment: usize,
-    /// Its place in that experiment, from 1.
+    /// Number of the run in that experiment, from 1.
     place: u64,
 }
 
-/// Some runs of a plan, each once: all, or every n-th.
+/// Runs of a plan, each once: all, or every *n*-th.
 #[derive(Clone, Copy, Debug)]
 pub struct Runs<'a> {
     plan: &'a Plan,
@@ -88,7 +86,7 @@ pub struct Runs<'a> {
     step: u64,
 }
 
-/// Some runs of a plan that differ in nothing but their seeds.
+/// Runs of a plan that differ only in their seeds.
 #[derive(Clone, Debug)]
 pub struct RunsAlike {
     settings: PlannedSettings,
@@ -98,13 +96,13 @@ pub struct RunsAlike {
 }
 
 impl PlannedExperiment {
-    /// Every combination of its settings.
+    /// Returns every combination of the experiment's settings.
     pub fn settings(&self) -> impl Iterator<Item = PlannedSettings> {
         (0..self.asked.combinations()).map(|combination| self.combination(combination))
     }
 
     /// # Panics
-    /// If the combination does not exist. All settings were checked when the plan was made.
+    /// If the combination does not exist. All settings were checked when the plan was created.
     fn combination(&self, combination: u64) -> PlannedSettings {
         let settings = self
             .asked
@@ -119,7 +117,8 @@ impl PlannedExperiment {
         }
     }
 
-    /// The runs after the planned ones: of all settings in turn, with the seeds that follow.
+    /// Returns the runs beyond the plan: of all settings in turn, with the seeds after the planned
+    /// ones.
     pub fn further(&self) -> impl Iterator<Item = PlannedRun> {
         (0..u64::from(u32::MAX)).flat_map(|round| {
             self.settings()
@@ -129,12 +128,12 @@ impl PlannedExperiment {
 }
 
 impl PlannedSettings {
-    /// The runs, by seed.
+    /// Returns the runs, by seed.
     pub fn runs(&self) -> impl Iterator<Item = PlannedRun> {
         (0..u64::from(self.number)).filter_map(|number| self.run(number))
     }
 
-    /// A run, planned or beyond the plan; none if there is no such seed.
+    /// Returns a run, planned or beyond the plan; `None` if the seed would exceed the maximum.
     fn run(&self, number: u64) -> Option<PlannedRun> {
         let seed = self.settings.seed().checked_add(number)?;
         let settings = self.settings.clone().with_seed(seed);
@@ -150,7 +149,7 @@ impl PlannedSettings {
 }
 
 impl PlannedRun {
-    /// Its directory below that of the suite.
+    /// Returns the run's directory, given the suite's directory.
     #[must_use]
     pub fn directory(&self, suite: &Path) -> PathBuf {
         suite.join(RUNS).join(&self.id)
@@ -158,19 +157,19 @@ impl PlannedRun {
 }
 
 impl<'a> Runs<'a> {
-    /// Returns how many there are.
+    /// Returns the number of runs.
     #[must_use]
     pub fn number(self) -> u64 {
         let all: u64 = self.plan.different.iter().map(|r| u64::from(r.runs)).sum();
         all.saturating_sub(self.first).div_ceil(self.step)
     }
 
-    /// The runs, in order.
+    /// Returns the runs, in order.
     pub fn iter(self) -> impl Iterator<Item = PlannedRun> + 'a {
         self.by_settings().flat_map(|alike| alike.runs())
     }
 
-    /// The runs, in order, by their settings.
+    /// Returns the runs, in order, grouped by settings.
     pub fn by_settings(self) -> impl Iterator<Item = RunsAlike> + 'a {
         let Self { plan, first, step } = self;
         let mut skipped = first;
@@ -197,34 +196,34 @@ impl RunsAlike {
         &self.settings.settings
     }
 
-    /// Returns how many there are.
+    /// Returns the number of runs.
     #[must_use]
     pub fn number(&self) -> u64 {
         self.number
     }
 
-    /// The runs, in order.
+    /// Returns the runs, in order.
     pub fn runs(self) -> impl Iterator<Item = PlannedRun> {
         (0..self.number).filter_map(move |n| self.settings.run(self.first + n * self.step))
     }
 }
 
-/// The directory of the runs in that of their suite.
+/// Name of the directory of the runs, in the suite's directory.
 pub const RUNS: &str = "runs";
 
-/// The plan cannot be made.
+/// The reason why a plan cannot be created.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
     /// No experiment has this name.
-    #[error("--only = {name}: experiments are {}", names.join(", "))]
+    #[error("--only = {name}: expected one of the experiments: {}", names.join(", "))]
     NoSuchExperiment {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The names there are.
+        /// The existing names.
         names: Vec<String>,
     },
-    /// There are too few seeds, or too many combinations.
+    /// The seeds exceed the maximum, or the combinations are too many.
     #[error("experiment {experiment:?}: {problem}")]
     Experiment {
         /// The experiment.
@@ -238,11 +237,13 @@ pub enum PlanError {
 }
 
 impl Plan {
-    /// The runs of a suite, or of one of its experiments, with a different number of runs or times as
-    /// many if asked for. Optional experiments are in only if they are named or all are wanted.
+    /// Plans the runs of a suite, or only of the experiment named `only`, optionally with a
+    /// different number of runs. Optional experiments are included if named or if `with_optional`
+    /// is set.
     ///
     /// # Errors
-    /// [`PlanError`] if there is no such experiment, or there are too few seeds.
+    /// [`PlanError`] if the experiment does not exist, or its seeds or combinations exceed the
+    /// limits.
     pub fn new(
         suite: &Suite,
         only: Option<&str>,
@@ -291,13 +292,13 @@ impl Plan {
         })
     }
 
-    /// Every run once, in order.
+    /// Returns every run once, in order.
     #[must_use]
     pub fn runs(&self) -> Runs<'_> {
         self.share(0, 1)
     }
 
-    /// Every `of`-th run, from the one with this index on.
+    /// Returns every `of`-th run, starting at `index`.
     #[must_use]
     pub fn share(&self, index: u32, of: u32) -> Runs<'_> {
         Runs {
@@ -307,7 +308,7 @@ impl Plan {
         }
     }
 
-    /// A run for people: its place in its experiment, its settings and seed.
+    /// Describes a run by its number in the experiment, its settings and its seed.
     #[must_use]
     pub fn title(&self, run: &PlannedRun) -> String {
         let PlannedExperiment { name, asked, .. } = &self.experiments[run.experiment];
@@ -319,13 +320,13 @@ impl Plan {
     }
 }
 
-/// The runs of all experiments in order, less those that came before.
+/// Returns the runs of all experiments in order, without repeated runs.
 fn different(experiments: &[PlannedExperiment]) -> Result<Vec<SeedRange>, SettingError> {
     let mut ranges = Vec::new();
     let mut names = Vec::new();
     for experiment in experiments {
         for combination in 0..experiment.asked.combinations() {
-            // What the settings are without their seed.
+            // Compare the settings without their seed.
             let settings = experiment.asked.settings(combination)?.with_seed(0);
             names.push((run_id(&settings), ranges.len()));
             ranges.push(SeedRange {
@@ -337,7 +338,7 @@ fn different(experiments: &[PlannedExperiment]) -> Result<Vec<SeedRange>, Settin
         }
     }
     names.sort_unstable();
-    // Ranges whose settings came before, with what they still add.
+    // For ranges whose settings occur several times: the seeds that no earlier range has.
     let mut cut: BTreeMap<usize, Vec<SeedRange>> = BTreeMap::new();
     for same in names.chunk_by(|one, next| one.0 == next.0) {
         let mut before: Vec<Range<u64>> = Vec::new();
@@ -363,7 +364,7 @@ fn different(experiments: &[PlannedExperiment]) -> Result<Vec<SeedRange>, Settin
     Ok(left.collect())
 }
 
-/// Returns what is left of some seeds without those of other ranges, in order.
+/// Removes the seeds of other ranges from a range; returns the remaining ranges, in order.
 fn without(seeds: Range<u64>, others: &[Range<u64>]) -> Vec<Range<u64>> {
     others.iter().fold(vec![seeds], |left, other| {
         left.into_iter()
@@ -435,7 +436,10 @@ mod tests {
         assert_eq!(plan.runs().number(), expected.len() as u64);
         let by_settings = plan.runs().by_settings().map(|alike| alike.number());
         assert_eq!(by_settings.sum::<u64>(), expected.len() as u64);
-        assert!(expected.len() < 3 * 2 + 9 * 6 + 4 * 4, "some are shared");
+        assert!(
+            expected.len() < 3 * 2 + 9 * 6 + 4 * 4,
+            "some runs are shared"
+        );
     }
 
     #[test]

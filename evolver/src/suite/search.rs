@@ -1,8 +1,7 @@
-//! Searches: evolving on until a structure is there that a resilience experiment is about.
-//!
-//! The runs of the experiment come first. If none of them is named after the structure, the seeds
-//! that follow are run, of all settings in turn, until one is; its place in that order says how many
-//! it took, whichever process did them.
+//! Searches: evolution of further seeds until a run has the structure that a damage experiment
+//! needs. The planned runs of the experiment come first. If the structure dominates none of them,
+//! further seeds are run, of all settings in turn, until it dominates a run. The number of that run
+//! in this order is the number of runs needed, regardless of which processes executed them.
 
 use super::file::Resilience;
 use super::plan::{Plan, PlannedRun};
@@ -10,23 +9,23 @@ use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_sim::{Structure, classify};
 use std::path::Path;
 
-/// How far a search is.
+/// State of a search.
 #[derive(Clone, Debug)]
 pub enum Search {
-    /// A planned run has the structure; or nothing was asked for.
+    /// A planned run has the structure, or no search was requested.
     NotNeeded,
-    /// Planned runs are not done yet.
+    /// Some planned runs are not done yet.
     Waits,
-    /// This run is next: run *k* beyond the plan, from 1.
+    /// The next run to execute: run *k* beyond the plan, from 1.
     Next(Box<PlannedRun>, u32),
-    /// This run has it: run *k* beyond the plan, from 1.
+    /// The run that has the structure: run *k* beyond the plan, from 1.
     Found(Box<PlannedRun>, u32),
-    /// All further runs, this many, are done, and none has it.
+    /// This number of further runs, the maximum, are done, and none has the structure.
     NotFound(u32),
 }
 
-/// Searches the files of a suite. The first `after` runs beyond the plan are known not to have the
-/// structure and are skipped. A damaged run counts as not done.
+/// Searches the runs of a suite in its directory. Skips the first `after` runs beyond the plan,
+/// which are known not to have the structure. A damaged run counts as not done.
 pub fn look(
     plan: &Plan,
     asked: &Resilience,
@@ -64,7 +63,7 @@ pub fn look(
     Search::NotFound(asked.further_runs)
 }
 
-/// Returns whether a run is named after a structure; none if it is not done.
+/// Returns whether a structure dominates a run; `None` if the run is not done.
 fn has(
     run: &PlannedRun,
     structure: Structure,
@@ -128,7 +127,7 @@ mod tests {
         let scratch = tempfile::tempdir().unwrap();
         let everywhere = scratch.path().join("everywhere");
         let (_, plan) = suite("line", 1);
-        // What there is to find: the first run beyond the plan with something new in its name.
+        // The run to find: the first run beyond the plan that is dominated by a new structure.
         let mut known = BTreeSet::new();
         for run in plan.runs().iter() {
             done(&run, &everywhere);
@@ -144,7 +143,7 @@ mod tests {
                 let new = names.into_iter().find(|s| !known.contains(s.name()))?;
                 Some((number, new, run))
             })
-            .expect("among 200 runs is something that the first two did not form");
+            .expect("one of 200 runs forms a structure that the first two did not form");
         let seeds: Vec<u64> = plan.experiments[0]
             .further()
             .take(4)
@@ -153,7 +152,7 @@ mod tests {
         assert_eq!(
             seeds,
             [2, 2, 3, 3],
-            "settings in turn, seeds after the planned"
+            "settings alternate, and seeds follow the planned ones"
         );
 
         let directory = scratch.path().join("searched");
@@ -182,6 +181,9 @@ mod tests {
             ..asked.clone()
         };
         let looked = looked(&plan, &none, &directory, 0);
-        assert!(matches!(looked, Search::NotNeeded), "none was asked for");
+        assert!(
+            matches!(looked, Search::NotNeeded),
+            "no search was requested"
+        );
     }
 }

@@ -1,7 +1,5 @@
-//! Slurm: one job array whose tasks are shares of a suite's runs.
-//!
-//! Tasks do not talk to each other; one that is requeued, or runs twice, finds by the files what is
-//! done.
+//! Slurm: a job array whose tasks are shares of a suite's runs. Tasks do not communicate; a task
+//! that is requeued or runs twice determines from the files which runs are done.
 
 use super::cluster::{Job, SCRIPT};
 use minimal_surprise_evolution::files::FileError;
@@ -10,45 +8,45 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The output of a task, in the folder that the array is submitted from: Slurm does not accept every
+/// Log file of a task, in the folder that the array is submitted from: Slurm does not accept every
 /// path in a script.
 const LOG: &str = "log-%a.txt";
 
-/// The job could not be submitted.
+/// The reason why a job could not be submitted.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SubmitError {
     /// A file cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Slurm takes these characters for its own in the path of a log.
-    #[error("{}: Slurm writes no logs below a directory with % or \\ in its path; name another with --out", .0.display())]
+    /// The path contains characters that have a special meaning for Slurm in the path of a log.
+    #[error("{}: Slurm cannot write logs below a directory with % or \\ in its path; choose a different directory with --out", .0.display())]
     UnusablePath(PathBuf),
-    /// There is no `sbatch`.
+    /// `sbatch` is not installed or cannot be started.
     #[error("sbatch cannot be started ({0}); is this a login node of a Slurm cluster?")]
     NoSbatch(io::Error),
-    /// Slurm refused the job.
-    #[error("sbatch refused the job: {said}{}", at_most(*.shards, *.array_max))]
+    /// Slurm rejected the job.
+    #[error("sbatch rejected the job: {said}{}", at_most(*.shards, *.array_max))]
     Refused {
-        /// What it said.
+        /// The message from `sbatch`.
         said: String,
-        /// Tasks asked for.
+        /// Number of requested tasks.
         shards: u32,
-        /// Maximum number of tasks that this cluster takes, where that is known and less.
+        /// Maximum number of tasks that this cluster accepts, if it is known and smaller.
         array_max: Option<u32>,
     },
 }
 
 fn at_most(shards: u32, array_max: Option<u32>) -> String {
     array_max.map_or(String::new(), |most| {
-        format!("\n--shards = {shards}: this cluster takes from 1 to {most} (its MaxArraySize)")
+        format!("\n--shards = {shards}: this cluster accepts from 1 to {most} (its MaxArraySize)")
     })
 }
 
-/// The job script of the next submission.
+/// Returns the job script of the next submission.
 ///
 /// # Errors
-/// [`SubmitError::UnusablePath`].
+/// [`SubmitError::UnusablePath`] if Slurm cannot use the directory's path for logs.
 pub fn script(job: &Job<'_>) -> Result<String, SubmitError> {
     check_path(job)?;
     Ok(script_in(job, &job.next_folder()))
@@ -79,16 +77,17 @@ fn script_in(job: &Job<'_>, folder: &Path) -> String {
     )
 }
 
-/// Writes what the tasks need and submits the array; returns what `sbatch` prints.
+/// Writes the files that the tasks need and submits the array; returns the output of `sbatch`.
 ///
 /// # Errors
-/// [`SubmitError`] if a file cannot be written or Slurm refuses the job; nothing of it is left then.
+/// [`SubmitError`] if a file cannot be written or Slurm rejects the job; the submission's folder is
+/// removed in that case.
 pub fn submit(job: &Job<'_>, suite_text: &str) -> Result<String, SubmitError> {
     check_path(job)?;
     let folder = job.write(suite_text, |folder| script_in(job, folder))?;
     let submitted = submit_from(job, &folder);
     if submitted.is_err() {
-        // No task reads it; failure to remove it is ignored.
+        // The folder is not used; failure to remove it is ignored.
         let _ = fs::remove_dir_all(&folder);
     }
     submitted
@@ -110,7 +109,8 @@ fn submit_from(job: &Job<'_>, folder: &Path) -> Result<String, SubmitError> {
     })
 }
 
-/// Maximum number of tasks of an array on this cluster: Slurm does not report it when it refuses more.
+/// Queries the maximum number of tasks of an array, since `sbatch` does not report it when it
+/// rejects more.
 fn array_max() -> Option<u32> {
     let output = Command::new("scontrol").args(["show", "config"]).output();
     let config = String::from_utf8_lossy(&output.ok()?.stdout).into_owned();

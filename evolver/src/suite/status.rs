@@ -1,4 +1,4 @@
-//! The status of a suite: how many of its runs are done, by their files.
+//! The status of a suite: the number of completed runs, determined from their files.
 
 use super::plan::{Plan, PlannedRun, Runs};
 use super::work::progress;
@@ -10,19 +10,19 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The hashes of the runs that are done.
+/// The hashes of completed runs.
 #[derive(Clone, Debug, Default)]
 pub struct Hashes {
     sum: Sha256,
-    /// Number of runs.
+    /// Number of completed runs.
     pub done: u64,
-    /// The lines of `hashes.txt`, one per run: its name and its hash. Only on request: there may be
+    /// The lines of `hashes.txt`, one per run: run ID and hash. Only on request, since there may be
     /// millions.
     pub lines: Option<Vec<u8>>,
 }
 
 impl Hashes {
-    /// Those of some runs, each read once.
+    /// Reads the hashes of some runs, each once.
     #[must_use]
     pub fn read(runs: Runs<'_>, suite: &Path, lines: bool, damaged: &mut DamagedRuns) -> Self {
         let mut hashes = Self {
@@ -35,13 +35,14 @@ impl Hashes {
         hashes
     }
 
-    /// Reads a run; whether it is done.
+    /// Reads a run; returns whether it is done.
     fn add(&mut self, run: &PlannedRun, suite: &Path, damaged: &mut DamagedRuns) -> bool {
         let directory = run.directory(suite);
         let Some(finished) = damaged.read(&directory) else {
             return false;
         };
-        // A process killed at the very end leaves temporary files; failure to remove them is ignored.
+        // A process that was killed in its last step leaves temporary files; failure to remove them
+        // is ignored.
         let _ = tidy(&directory);
         let line = format!("{} {}\n", run.id, finished.hash);
         self.sum.update(&line);
@@ -52,25 +53,25 @@ impl Hashes {
         true
     }
 
-    /// The hash of the suite, if all of its runs are done: the SHA-256 of all lines.
+    /// Returns the hash of the suite, the SHA-256 of all lines, if all runs are done.
     #[must_use]
     pub fn of_all(self, runs: Runs<'_>) -> Option<String> {
         (self.done == runs.number()).then(|| hex(&self.sum.finalize()))
     }
 }
 
-/// How many runs with the same settings are done.
+/// Numbers of runs with the same settings, by their state.
 #[derive(Clone, Debug, Default)]
 pub struct Counts {
-    /// What distinguishes the settings.
+    /// Label of the settings.
     pub label: String,
-    /// Planned.
+    /// Number of planned runs.
     pub number: u32,
-    /// Complete.
+    /// Number of completed runs.
     pub done: u32,
-    /// Begun, and not complete.
+    /// Number of runs that are begun but not complete.
     pub begun: u32,
-    /// Damaged.
+    /// Number of damaged runs.
     pub damaged: u32,
 }
 
@@ -79,11 +80,11 @@ pub struct Counts {
 pub struct Status {
     /// The experiments by name, with the counts of their settings.
     pub experiments: Vec<(String, Vec<Counts>)>,
-    /// Different runs that are done.
+    /// Number of different runs that are done.
     pub done: u64,
     /// The hash of all runs, if all are done.
     pub hash: Option<String>,
-    /// Runs that are damaged.
+    /// Damaged runs.
     pub damaged: DamagedRuns,
 }
 
@@ -91,11 +92,12 @@ impl Status {
     /// Reads every run of a suite once.
     ///
     /// # Errors
-    /// [`ReadRunError`] if the files cannot be looked at.
+    /// [`ReadRunError`] if the files cannot be accessed.
     pub fn read(plan: &Plan, suite: &Path) -> Result<Self, ReadRunError> {
         let mut damaged = DamagedRuns::default();
         let mut hashes = Hashes::default();
-        // Experiments share runs; of a million pending ones none is kept.
+        // Experiments share runs, so remember their states. Pending runs, maybe a million, are not
+        // stored.
         let mut known: BTreeMap<String, Progress> = BTreeMap::new();
         for run in plan.runs().iter() {
             if hashes.add(&run, suite, &mut damaged) {
@@ -139,11 +141,11 @@ impl Status {
     }
 }
 
-/// Checks whether a run that is not complete can be resumed.
+/// Checks that an incomplete run can be resumed; otherwise adds it to the damaged runs.
 fn check_begun(run: &PlannedRun, suite: &Path, damaged: &mut DamagedRuns) {
     let is_begun = || matches!(progress(run, suite), Ok(Progress::Begun));
     let directory = run.directory(suite);
-    // Another process may have completed it meanwhile.
+    // Another process may have completed the run in the meantime.
     if let Err(error) = RunDir::check_unfinished(&directory)
         && is_begun()
     {

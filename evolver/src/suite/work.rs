@@ -1,8 +1,6 @@
-//! Work: doing the runs of a plan that are not done.
-//!
-//! Files in the suite's directory are the only truth: a run is done when its directory has `DONE`
-//! and what belongs to it.
-//! Any number of processes may work on the same plan; each takes runs that no other holds.
+//! Work: execution of a single run of a plan. The state of a run is determined only by files: a run
+//! is done if its directory contains `DONE` and all other files of a completed run. Any number of
+//! processes may work on the same plan; each takes only runs that no other process has locked.
 
 use super::plan::{Plan, PlannedRun, Runs};
 use crate::program::this_program;
@@ -18,34 +16,34 @@ use std::sync::atomic::AtomicBool;
 use std::thread;
 use std::time::Duration;
 
-/// A share of the runs: every n-th from the i-th on.
+/// A share of the runs: every *n*-th, starting at run *i*.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Which share, from 0.
+    /// Index of the share, from 0.
     pub index: u32,
     /// Number of shares.
     pub of: u32,
 }
 
 impl Shard {
-    /// All runs.
+    /// The share that contains all runs.
     pub const ALL: Self = Self { index: 0, of: 1 };
 
-    /// A shard written as `i/n`, i from 0.
+    /// Parses a shard written as `i/n`, i from 0.
     ///
     /// # Errors
-    /// What would be valid.
+    /// If the text is not a valid shard; the message describes the valid form.
     pub fn parse(text: &str) -> Result<Self, String> {
         let parts = text
             .split_once('/')
             .and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
         match parts {
             Some((index, of)) if index < of => Ok(Self { index, of }),
-            _ => Err("expected i/n with i from 0 to n − 1, as in 0/8".to_owned()),
+            _ => Err("expected i/n with i from 0 to n − 1, such as 0/8".to_owned()),
         }
     }
 
-    /// Returns where the hashes of the share's runs are written once all are done.
+    /// Returns the name of the file for the hashes of the share's runs.
     #[must_use]
     pub fn hashes_file(self) -> String {
         match self.of {
@@ -54,17 +52,17 @@ impl Shard {
         }
     }
 
-    /// The runs of this share.
+    /// Returns the runs of this share.
     #[must_use]
     pub fn of_plan(self, plan: &Plan) -> Runs<'_> {
         plan.share(self.index, self.of)
     }
 }
 
-/// Returns how far a run is, by its files.
+/// Returns the state of a run, determined from its files.
 ///
 /// # Errors
-/// [`ReadRunError::Damaged`] if it is marked complete, and is not.
+/// [`ReadRunError::Damaged`] if the run is marked complete but is not.
 pub fn progress(run: &PlannedRun, suite: &Path) -> Result<Progress, ReadRunError> {
     let directory = run.directory(suite);
     Ok(if complete(&directory)?.is_some() {
@@ -79,15 +77,15 @@ pub fn progress(run: &PlannedRun, suite: &Path) -> Result<Progress, ReadRunError
 /// The result of work on a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// It is complete now.
+    /// The run is complete.
     Completed,
-    /// Another process has it; its lock may say which.
+    /// Another process has locked the run; the holder is given if the lock names it.
     Held(Option<Holder>),
-    /// It was interrupted, and can be resumed.
+    /// The run was interrupted and can be resumed.
     Interrupted,
 }
 
-/// Waiting for runs that other processes have, or for the end of those processes.
+/// Pauses while waiting for runs that other processes have locked.
 #[derive(Debug)]
 pub struct Waiting {
     pause: Duration,
@@ -95,14 +93,14 @@ pub struct Waiting {
 }
 
 impl Waiting {
-    /// The first pause; each is twice as long as the one before.
+    /// The first pause; each further pause is twice as long.
     const PAUSE_MIN: Duration = Duration::from_millis(10);
     /// The longest pause.
     const PAUSE_MAX: Duration = Duration::from_secs(1);
-    /// Waiting is reported from a pause of this length.
+    /// Minimum pause at which waiting is reported.
     const PAUSE_SAID: Duration = Duration::from_millis(160);
 
-    /// Has not waited yet.
+    /// Creates the state before the first pause.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -111,7 +109,7 @@ impl Waiting {
         }
     }
 
-    /// Waits before this run is checked again. The wait is reported once per run.
+    /// Pauses before this run is checked again, and calls `say` once per run if waiting takes long.
     pub fn wait_for(&mut self, run: &PlannedRun, say: impl FnOnce()) {
         if self.pause >= Self::PAUSE_SAID && self.said_of != run.id {
             say();
@@ -121,7 +119,7 @@ impl Waiting {
         self.pause = (self.pause * 2).min(Self::PAUSE_MAX);
     }
 
-    /// A run has ended, so others may end soon.
+    /// Resets the pause after a run has ended, since others may end soon.
     pub fn one_ended(&mut self) {
         self.pause = Self::PAUSE_MIN;
     }
@@ -133,7 +131,8 @@ impl Default for Waiting {
     }
 }
 
-/// Does a run, from its last checkpoint. `each_generation` receives the number of generations done.
+/// Executes a run from its last checkpoint; calls `each_generation` with the number of completed
+/// generations.
 ///
 /// # Errors
 /// [`RunDirError`] if the directory cannot be used.
@@ -144,7 +143,8 @@ pub fn work_on(
     each_generation: impl FnMut(u32),
 ) -> Result<Outcome, RunDirError> {
     match begin_or_resume(run, suite, stop, each_generation) {
-        // Another process did the same run, unseen for lack of locks, and tidied up after both.
+        // Without working locks, another process executed the same run unnoticed, and removed the
+        // temporary files of both.
         Err(_) if matches!(progress(run, suite), Ok(Progress::Done)) => Ok(Outcome::Completed),
         worked => worked,
     }
@@ -184,14 +184,14 @@ fn begin_or_resume(
     Ok(Outcome::Completed)
 }
 
-/// The run as it stands, held by this process; none if it is complete.
+/// Opens and locks a run in its current state; `None` if it is complete.
 fn open(run: &PlannedRun, directory: &Path) -> Result<Option<(Experiment, RunDir)>, RunDirError> {
     match found(directory) {
         Err(RunDirError::NotARun { .. } | RunDirError::NotThere(_)) => {
             let experiment = Experiment::new(run.settings.clone());
             match RunDir::create(directory, &experiment, &this_program()) {
                 Ok(held) => Ok(Some((experiment, held.with_table_last()))),
-                // Another process has just made it.
+                // Another process has just created the run.
                 Err(RunDirError::Exists(_)) => found(directory),
                 Err(error) => Err(error),
             }
@@ -243,7 +243,7 @@ mod tests {
                 let name = entry.file_name().to_string_lossy().into_owned();
                 (name, fs::read(entry.path()).unwrap())
             })
-            // How long it took is no result.
+            // The duration is not part of the result.
             .filter(|(name, _)| name != "time.json")
             .collect()
     }
@@ -261,7 +261,7 @@ mod tests {
         let directory = run.directory(&suite);
 
         let (mut slower, held) = open(&run, &directory).unwrap().unwrap();
-        // The next process makes its own lock, as on machines that do not see each other's locks.
+        // The next process creates its own lock, as on machines that do not see each other's locks.
         fs::remove_file(directory.join(".lock")).unwrap();
         assert_eq!(
             work_on(&run, &suite, &stop, |_| {}).unwrap(),
@@ -274,7 +274,7 @@ mod tests {
             held.save(&slower).unwrap();
             let mut now = contents(&directory);
             assert!(now.remove("checkpoint").is_some());
-            assert_eq!(now, expected, "complete for all who look");
+            assert_eq!(now, expected, "complete for all readers");
         }
         let result = slower.result().unwrap().unwrap();
         held.finish(&slower, &result).unwrap();

@@ -1,5 +1,5 @@
-//! A worker: does the runs of a suite that are not done, one after the other, and waits for those
-//! that other processes do.
+//! A worker: executes the runs of a suite that are not done, one at a time, and waits for runs that
+//! other processes execute.
 
 use super::file::Resilience;
 use super::plan::{Plan, PlannedRun, RUNS, Runs};
@@ -16,52 +16,53 @@ use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Sees how the work goes on.
+/// Receiver of progress events.
 pub trait Watch {
-    /// A run begins or is resumed; beyond the plan, with its number there, from 1.
+    /// Receives the start or resumption of a run; `further` is the number of a run beyond the plan,
+    /// from 1.
     fn begins(&self, run: &PlannedRun, further: Option<u32>);
 
-    /// A run has done this number of generations.
+    /// Receives the number of completed generations of a run.
     fn generation(&self, _run: &PlannedRun, _generations: u32) {}
 
-    /// A run is complete.
+    /// Receives the completion of a run.
     fn completed(&self, _run: &PlannedRun) {}
 
-    /// Another process works on the run in this directory.
+    /// Receives that the worker waits because another process has locked the run.
     fn waits(&self, run: &PlannedRun, directory: &Path, holder: Option<&Holder>);
 }
 
-/// The runs that are to be done, by their files.
+/// The runs that are still to be done, determined from their files.
 #[derive(Clone, Debug)]
 pub struct ToDo {
-    /// Of each run, whether it is to be done.
+    /// Whether each run is to be done.
     each: Vec<bool>,
-    /// How many are to be done.
+    /// Number of runs to be done.
     pub number: u64,
-    /// Robot-steps that they take.
+    /// Number of robot-steps of these runs.
     pub robot_steps: u64,
-    /// Memory and disk that they take.
+    /// Memory and disk that these runs need.
     pub needs: NeedsOfRuns,
 }
 
-/// It is not known what is to be done, or it is too much.
+/// The reason why the runs to be done are unknown or cannot be started.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ToDoError {
     /// The folder of the runs cannot be read.
     #[error(transparent)]
     Folder(#[from] FileError),
-    /// The disk cannot hold the runs.
+    /// The disk is too small for the runs.
     #[error(transparent)]
     TooMuch(#[from] TooMuch),
 }
 
 impl ToDo {
-    /// Reads the files; a damaged run is not to be done.
+    /// Determines the runs to be done from the files; damaged runs are not among them.
     ///
     /// # Errors
-    /// [`ToDoError`] if the folder cannot be read, or the disk is much too small, before billions of
-    /// runs are looked at.
+    /// [`ToDoError`] if the folder cannot be read or the disk is much too small. The disk is
+    /// checked first, since there may be billions of runs.
     pub fn read(
         runs: Runs<'_>,
         suite: &Path,
@@ -104,32 +105,32 @@ impl ToDo {
     }
 }
 
-/// How the work ended.
+/// Result of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// Everything is done that could be.
+    /// All work that could be done is done.
     Whole,
-    /// It was asked to stop.
+    /// The work was asked to stop.
     Interrupted,
 }
 
-/// Does runs one after the other.
+/// A worker that executes runs one at a time.
 #[derive(Debug)]
 pub struct Worker<'a> {
     plan: &'a Plan,
     directory: &'a Path,
     stop: &'a AtomicBool,
-    /// Runs that are damaged.
+    /// Damaged runs.
     pub damaged: DamagedRuns,
-    /// Whether anything was done.
+    /// Whether any work was done.
     pub begun: bool,
 }
 
-/// Runs that other processes work on.
+/// Runs that other processes have locked.
 type Held = Vec<(PlannedRun, Option<Holder>)>;
 
 impl<'a> Worker<'a> {
-    /// A worker that has done nothing.
+    /// Creates a worker.
     #[must_use]
     pub fn new(
         plan: &'a Plan,
@@ -146,8 +147,8 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Works on a run; none if something is wrong with this run alone, which is then known as
-    /// damaged.
+    /// Executes a run; returns `None` if an error concerns only this run, and adds it to the
+    /// damaged runs.
     fn work_on(
         &mut self,
         run: &PlannedRun,
@@ -187,10 +188,10 @@ impl<'a> Worker<'a> {
         Ok(Ended::Whole)
     }
 
-    /// Does what is to be done, and waits for what other processes do.
+    /// Executes the runs to be done, and waits for runs that other processes execute.
     ///
     /// # Errors
-    /// [`RunDirError`] if something is wrong that is not one run's.
+    /// [`RunDirError`] if an error does not concern only a single run.
     pub fn do_all(
         &mut self,
         runs: Runs<'_>,
@@ -224,10 +225,10 @@ impl<'a> Worker<'a> {
         Ok(Ended::Whole)
     }
 
-    /// Evolves further seeds until a run has the structure that an experiment is about.
+    /// Evolves further seeds until a run has the structure that a damage experiment needs.
     ///
     /// # Errors
-    /// [`RunDirError`] if something is wrong that is not one run's.
+    /// [`RunDirError`] if an error does not concern only a single run.
     pub fn search(&mut self, asked: &Resilience, watch: &dyn Watch) -> Result<Ended, RunDirError> {
         let (mut after, mut begun) = (0, 0);
         let mut waiting = Waiting::new();
@@ -246,7 +247,8 @@ impl<'a> Worker<'a> {
             }
             match self.work_on(&run, |_| {})? {
                 Some(Outcome::Completed) => after = number - 1,
-                // Another process searches, too, and its run decides whether more are needed.
+                // Another process also searches, and the result of its run decides whether more
+                // runs are needed.
                 Some(Outcome::Held(_)) if self.stop.load(Ordering::Relaxed) => {
                     return Ok(Ended::Interrupted);
                 }
@@ -254,7 +256,7 @@ impl<'a> Worker<'a> {
                     watch.waits(&run, &directory, holder.as_ref());
                 }),
                 Some(Outcome::Interrupted) => return Ok(Ended::Interrupted),
-                // A damaged run does not show whether more are needed.
+                // With a damaged run it is unknown whether more runs are needed.
                 None => return Ok(Ended::Whole),
             }
         }

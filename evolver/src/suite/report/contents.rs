@@ -1,4 +1,4 @@
-//! The contents of a report, before it is written in any format.
+//! The contents of a report, independent of the output format.
 
 use super::figures::{self, Figure, FigureError};
 use super::findings::{self, Finding, Verdict};
@@ -15,7 +15,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-/// Names of a report's other files, without their ends.
+/// Names of a report's other files, without their extensions.
 const OTHER_FILES: [&str; 4] = ["report", "runs", "findings", "how-made"];
 
 /// Provenance of a setting's runs, evolved or re-evaluated.
@@ -25,27 +25,27 @@ pub struct Provenance {
     pub experiment: String,
     /// The setting.
     pub setting: String,
-    /// Runs that are finished.
+    /// Number of finished runs.
     pub finished: usize,
-    /// Runs that are planned.
+    /// Number of planned runs.
     pub planned: usize,
-    /// First and last seed of those finished.
+    /// First and last seed of the finished runs.
     pub seeds: String,
-    /// Programs that did them.
+    /// Programs that executed the runs.
     pub programs: String,
-    /// SHA-256 of the runs' hashes, in order of their seeds; of runs that have none, of their
+    /// SHA-256 of the runs' hashes, in order of their seeds; for runs without a hash, of their
     /// outcomes.
     pub hash: String,
-    /// The command that does them.
+    /// The command that executes the runs.
     pub command: String,
-    /// Seconds of computing, all threads together; 0 if it was not measured.
+    /// CPU time in seconds, summed over all threads; 0 if it was not measured.
     pub cpu_s: f64,
-    /// Seconds on the clock.
+    /// Elapsed time in seconds.
     pub wall_s: f64,
 }
 
 impl Provenance {
-    /// Minutes of computing and on the clock, in words.
+    /// Formats CPU time and elapsed time in minutes.
     pub(super) fn minutes(&self) -> String {
         if self.cpu_s == 0.0 {
             "–".to_owned()
@@ -55,43 +55,43 @@ impl Provenance {
     }
 }
 
-/// Everything that a report says.
+/// The complete contents of a report.
 #[derive(Clone, Debug, Default)]
 pub struct SuiteReport {
     /// Name of the suite.
     pub suite: String,
-    /// Experiments that lack runs, in words.
+    /// Descriptions of settings with missing runs.
     pub missing: Vec<String>,
-    /// Names of damaged runs, which are left out.
+    /// IDs of damaged runs, which are left out.
     pub damaged: Vec<String>,
     /// The findings.
     pub findings: Vec<Finding>,
-    /// Where tests speak against our numbers and the paper's being the same, in words.
+    /// Descriptions of significant differences between our numbers and the paper's.
     pub differences: Vec<String>,
-    /// Notes on the differences: the lines of a text in the report's folder.
+    /// Notes on the differences: the lines of `looked-into.md` in the report's folder.
     pub looked_into: Vec<String>,
-    /// Whether a gallery of the runs lies in the report's folder.
+    /// Whether the report's folder contains a gallery of the runs.
     pub has_gallery: bool,
     /// Whether experiments share runs.
     pub shares_runs: bool,
-    /// Tests made in the tables that could find a difference, each counted once.
+    /// Number of tests in the tables that could find a difference, each counted once.
     pub tests: usize,
-    /// Whether there are numbers of the paper beside ours.
+    /// Whether the tables include numbers of the paper.
     pub has_paper: bool,
-    /// How the program was called with this suite.
+    /// The command line prefix that selects this suite.
     pub called: String,
     /// The tables.
     pub tables: Vec<Table>,
     /// The figures.
     pub figures: Vec<Figure>,
-    /// How long all runs took, each counted once.
+    /// Time spent on all runs, each counted once.
     pub time: TimeSpent,
     /// Provenance of the runs.
     pub making: Vec<Provenance>,
 }
 
 impl SuiteReport {
-    /// The report of gathered runs.
+    /// Creates the report of gathered runs.
     ///
     /// # Errors
     /// [`FigureError`] if a figure cannot be drawn.
@@ -149,7 +149,7 @@ impl SuiteReport {
         })
     }
 
-    /// Returns how long all runs took, in words; nothing if it was not measured.
+    /// Describes the time spent on all runs; `None` if it was not measured.
     pub(super) fn time_in_words(&self) -> Option<String> {
         let in_words = |s: f64| seconds(Duration::from_secs_f64(s));
         (self.time.sittings > 0).then(|| {
@@ -163,7 +163,7 @@ impl SuiteReport {
         })
     }
 
-    /// Findings of the paper that do not hold here.
+    /// Returns the findings of the paper that do not hold in our runs.
     pub fn different_findings(&self) -> impl Iterator<Item = &Finding> {
         self.findings
             .iter()
@@ -175,7 +175,8 @@ fn has_paper(table: &Table) -> bool {
     table.values().any(|value| value.paper.is_some())
 }
 
-/// The tests that could find a difference, with their tables; what two tables have counts once.
+/// Returns the tests that could find a difference, with their tables; a test in two tables counts
+/// once.
 fn tests(tables: &[Table]) -> Vec<(&Table, &Value)> {
     let mut tests: Vec<(&Table, &Value)> = Vec::new();
     for table in tables {
@@ -243,7 +244,7 @@ fn provenance(group: &Group, called: &str) -> Provenance {
     }
 }
 
-/// First and last seed, in words.
+/// Formats the first and last seed.
 fn seeds(runs: &[GatheredRun]) -> String {
     let mut seeds = runs.iter().map(|run| run.finished.settings.seed());
     match (seeds.next(), seeds.next_back()) {
@@ -253,7 +254,8 @@ fn seeds(runs: &[GatheredRun]) -> String {
     }
 }
 
-/// How the runs were made that a report itself runs again: from new starts and after damage.
+/// Returns the provenance of runs that the report itself executes: from new starts and after
+/// damage.
 fn made_again(gathered: &Gathered, called: &str) -> Vec<Provenance> {
     let program = format!(
         "{} {}, revision {}",

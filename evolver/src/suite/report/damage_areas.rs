@@ -1,21 +1,21 @@
-//! Which areas of a structure are damaged: small rectangles with given numbers of robots.
+//! Choice of the areas to damage: small rectangles with given numbers of robots.
 
 use minimal_surprise_sim::{Grid, Pose};
 
-/// Cells from x0 to x1 and from y0 to y1, ends included, not across the edge.
+/// Cells from x0 to x1 and from y0 to y1, inclusive, not wrapped around the edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rectangle {
-    /// West.
+    /// Westernmost column.
     pub x0: u32,
-    /// South.
+    /// Southernmost row.
     pub y0: u32,
-    /// East.
+    /// Easternmost column.
     pub x1: u32,
-    /// North.
+    /// Northernmost row.
     pub y1: u32,
 }
 
-/// Sums over all rectangles from the south-west corner.
+/// Prefix sums: sums over all rectangles that start at the south-west corner.
 struct Sums {
     width: usize,
     sums: Vec<u32>,
@@ -41,9 +41,9 @@ impl Sums {
     }
 }
 
-/// For every number, in order, the smallest rectangle that holds exactly this many robots and neither
-/// meets nor touches those before it; of equally small ones the one with the southernmost, then
-/// westernmost corner, then the flattest. None where there is no such rectangle.
+/// Returns, for every number in order, the smallest rectangle that contains exactly this number of
+/// robots and neither overlaps nor touches earlier rectangles; `None` if no rectangle qualifies.
+/// Ties go to the southernmost corner, then the westernmost, then the flattest rectangle.
 #[must_use]
 pub fn smallest_apart(grid: Grid, poses: &[Pose], numbers: &[u32]) -> Vec<Option<Rectangle>> {
     let mut robots = vec![false; grid.cells() as usize];
@@ -126,7 +126,7 @@ mod tests {
         assert_eq!(
             found(drawing, &[6, 4]),
             [Some((2, 0, 4, 1)), None],
-            "the other four touch across the edge"
+            "the other four robots touch the first area across the edge"
         );
         assert_eq!(
             found(drawing, &[6, 2]),

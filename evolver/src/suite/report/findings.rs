@@ -1,4 +1,4 @@
-//! The paper's main findings, and whether they hold in our runs.
+//! The paper's main findings, compared with our runs.
 
 use super::gather::{Gathered, GatheredRun, Group, Resilient, regained};
 use super::paper::{PaperValues, is_grouping};
@@ -9,30 +9,30 @@ use minimal_surprise_sim::structures::{LineOrientation, Structure};
 use serde::{Serialize, Serializer};
 use std::collections::BTreeSet;
 
-/// How far a median best fitness may be from the paper's.
+/// Maximum difference between a median best fitness and the paper's.
 const FITNESS_TOLERANCE: f64 = 0.03;
-/// Numbers printed with two digits may be this much further apart and still be as far apart as the
-/// tolerance says.
+/// Margin for floating-point error, so that printed numbers that differ by exactly the tolerance
+/// are accepted.
 const PRINTED: f64 = 1e-9;
 
-/// Whether a finding is seen in our runs too.
+/// Verdict on a finding of the paper in our runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// It is.
+    /// The finding holds.
     Holds,
-    /// A tendency is, but it may be chance.
+    /// The tendency exists, but may be due to chance.
     #[serde(rename = "holds, not significant")]
     HoldsNotSignificantly,
-    /// It is not.
+    /// The finding does not hold.
     Differs,
-    /// The runs that there are cannot tell.
+    /// The finished runs are not enough to decide.
     #[serde(rename = "not enough runs")]
     NotEnoughRuns,
 }
 
 impl Verdict {
-    /// In words.
+    /// Returns the verdict's text.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -44,30 +44,30 @@ impl Verdict {
     }
 }
 
-/// What a finding rests on.
+/// Evidence for a verdict, beyond the finding itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Detail {
-    /// Nothing that is not said with it.
+    /// No further evidence.
     None,
     /// The runs that contradict the claim.
     Contradicted(Vec<Contradiction>),
-    /// The result for all runs of a damaged structure, in words.
+    /// A description of the result for all runs of a damaged structure.
     Damaged(String),
 }
 
 /// A run that contradicts a finding.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Contradiction {
-    /// Its seed.
+    /// Seed of the run.
     pub seed: u64,
-    /// Its name.
+    /// Run ID.
     pub run: String,
-    /// What it formed, and its fitness.
+    /// Structures of the run, and its fitness.
     pub formed: String,
 }
 
 impl Detail {
-    /// In words, written down by functions for text and for code.
+    /// Describes the evidence; `text` and `code` format text and code.
     pub fn in_words(&self, text: fn(&str) -> String, code: fn(&str) -> String) -> String {
         let runs = match self {
             Self::None => return String::new(),
@@ -93,25 +93,25 @@ impl Serialize for Detail {
     }
 }
 
-/// A finding of the paper, and ours.
+/// A finding of the paper and the result in our runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct Finding {
-    /// What the paper found.
+    /// The paper's finding.
     pub claim: String,
-    /// What we found.
+    /// The result in our runs.
     pub ours: String,
-    /// Its evidence.
+    /// Evidence for the verdict.
     pub detail: Detail,
-    /// The test, or how it was told.
+    /// The test, or the criterion of the verdict.
     pub test: String,
-    /// Its p-value, if it has one.
+    /// The test's p-value, if it has one.
     pub p: Option<f64>,
-    /// Whether it holds.
+    /// The verdict.
     pub verdict: Verdict,
 }
 
 impl Finding {
-    /// Leaves out groups without runs.
+    /// Replaces the result if a group has no runs.
     fn about(mut self, groups: &[&Group]) -> Self {
         if groups.iter().any(|group| group.runs.is_empty()) {
             self.ours = "no runs yet".to_owned();
@@ -121,7 +121,7 @@ impl Finding {
     }
 }
 
-/// The groups that a finding is about; none of them if one is not in the plan.
+/// Looks up the groups of a finding; `None` if one is not in the plan.
 fn groups<'a, const N: usize>(
     gathered: &'a Gathered,
     wanted: [(&str, &str); N],
@@ -133,7 +133,7 @@ fn groups<'a, const N: usize>(
     found?.try_into().ok()
 }
 
-/// A statement that one run can break.
+/// Returns the verdict on a statement about all runs, which a single run can contradict.
 fn universal(groups: &[&Group], is_true: bool) -> Verdict {
     if !is_true && groups.iter().all(|group| !group.runs.is_empty()) {
         Verdict::Differs
@@ -144,7 +144,8 @@ fn universal(groups: &[&Group], is_true: bool) -> Verdict {
     }
 }
 
-/// A statement about a tendency: true, untrue and the test tells, or untrue by what may be chance.
+/// Returns the verdict on a statement about a tendency; a false statement differs only if the test
+/// is significant.
 fn tendency(groups: &[&Group], is_true: bool, test: Test) -> Verdict {
     let complete = groups.iter().all(|group| group.is_complete());
     if groups.iter().any(|group| group.runs.is_empty()) {
@@ -168,7 +169,7 @@ fn is_named(run: &GatheredRun, structures: &[Structure]) -> bool {
     run.name().is_some_and(|name| structures.contains(&name))
 }
 
-/// The runs of which something is not so.
+/// Returns the runs that do not satisfy a condition.
 fn others(group: &Group, is: impl Fn(&GatheredRun) -> bool) -> Detail {
     let others = group.runs.iter().filter(|run| !is(run)).map(|run| {
         let mut shares: Vec<_> = Structure::ALL.into_iter().zip(run.shares).collect();
@@ -191,12 +192,12 @@ fn others(group: &Group, is: impl Fn(&GatheredRun) -> bool) -> Detail {
     }
 }
 
-/// "12 of 20 runs", with the number of missing runs.
+/// Formats a count, such as "12 of 20 runs", with the number of planned runs if some are missing.
 fn of_runs(number: u32, group: &Group) -> String {
     format!("{number} of {} runs{}", group.runs.len(), unfinished(group))
 }
 
-/// Returns how many runs are planned, if they are not all finished.
+/// Formats the number of planned runs, if some are not finished.
 fn unfinished(group: &Group) -> String {
     if group.is_complete() {
         String::new()
@@ -205,7 +206,7 @@ fn unfinished(group: &Group) -> String {
     }
 }
 
-/// Every finding that the plan has the experiments for.
+/// Returns all findings whose experiments are in the plan.
 #[must_use]
 pub fn all(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
     if paper.distributions.is_empty() {
@@ -275,7 +276,7 @@ fn many_structures(gathered: &Gathered) -> Vec<Finding> {
     ["15x15", "20x20"].into_iter().filter_map(of_grid).collect()
 }
 
-/// More than half of the runs are named so.
+/// Returns the finding that more than half of the runs satisfy a condition.
 fn most(group: &Group, claim: &str, what: &str, is: impl Fn(&GatheredRun) -> bool) -> Finding {
     let named = count(group, is);
     let others = group.runs.len() as u32 - named;
@@ -539,7 +540,7 @@ fn noise(gathered: &Gathered) -> Vec<Finding> {
     ]
 }
 
-/// A line for every setting that the paper gives a median best fitness for.
+/// Returns a finding for every setting whose median best fitness is in the paper.
 fn fitness(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
     let of_group = |group: &Group| {
         let number = paper.number(&group.experiment, &group.label, MEDIAN_BEST_FITNESS)?;
@@ -547,7 +548,7 @@ fn fitness(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
         let ours = median(&values);
         let interval = median_interval(&values);
         let near = (ours - number.value).abs() <= FITNESS_TOLERANCE + PRINTED;
-        // Whether all of the interval is nearer, or all farther.
+        // The verdict is certain if the whole interval is within the tolerance, or none of it.
         let sure = values.len() >= RUNS_MIN
             && interval.is_some_and(|interval| {
                 let ends = [interval.low, interval.high];

@@ -1,4 +1,4 @@
-//! What a report is about: the finished runs of a plan, and what is made of them afterwards.
+//! The data of a report: the finished runs of a plan, their re-evaluations and damage experiments.
 
 use super::damage_areas::{Rectangle, smallest_apart};
 use super::numbers::plural;
@@ -20,21 +20,21 @@ use minimal_surprise_sim::{Area, Damage, DamageError, Pose, SeedTree, WorldError
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-/// Runs cannot be read or run again.
+/// The reason why runs cannot be read or executed again.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GatherError {
     /// A file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A final state is not one.
+    /// A final state is invalid.
     #[error(transparent)]
     World(#[from] WorldError),
     /// A structure cannot be damaged.
     #[error(transparent)]
     Damage(#[from] DamageError),
     /// A suite names an unknown structure.
-    #[error("structure = {name:?}: structures are {}", Structure::ALL.map(Structure::name).join(", "))]
+    #[error("structure = {name:?}: expected one of: {}", Structure::ALL.map(Structure::name).join(", "))]
     UnknownStructure {
         /// The name.
         name: String,
@@ -44,40 +44,41 @@ pub enum GatherError {
 /// A finished run with its structures and lines.
 #[derive(Clone, Debug)]
 pub struct GatheredRun {
-    /// Its name.
+    /// Run ID.
     pub id: String,
-    /// Everything in its directory.
+    /// The contents of the run's directory.
     pub finished: FinishedRun,
-    /// The structures it is named after, in the paper's order; several if tied, none if no robot
-    /// is in any.
+    /// The dominant structures, in the paper's order; several if tied, empty if no robot is in a
+    /// structure.
     pub names: Vec<Structure>,
-    /// Share of robots in each structure at the end, as [`Structure::ALL`].
+    /// Share of robots in each structure at the end, in the order of [`Structure::ALL`].
     pub shares: [f64; 8],
-    /// Its lines.
+    /// Numbers of lines.
     pub lines: LineCounts,
 }
 
 impl GatheredRun {
-    /// Fitness of the last generation's best genome.
+    /// Returns the fitness of the last generation's best genome.
     #[must_use]
     pub fn fitness(&self) -> f64 {
         self.finished.best_fitness.last().copied().unwrap_or(0.0)
     }
 
-    /// The structure that it counts for in tests: of tied ones the first in the paper's order.
+    /// Returns the structure that the run counts for in tests; ties go to the first in the paper's
+    /// order.
     #[must_use]
     pub fn name(&self) -> Option<Structure> {
         self.names.first().copied()
     }
 
-    /// Share of robots in a structure at the end.
+    /// Returns the share of robots in a structure at the end.
     #[must_use]
     pub fn share(&self, structure: Structure) -> f64 {
         let place = Structure::ALL.iter().position(|&s| s == structure);
         place.map_or(0.0, |place| self.shares[place])
     }
 
-    /// Share of robots in the structure that it is named after.
+    /// Returns the share of robots in the dominant structure.
     #[must_use]
     pub fn named_share(&self) -> f64 {
         self.name().map_or(0.0, |name| self.share(name))
@@ -89,15 +90,15 @@ impl GatheredRun {
 pub struct Group {
     /// The experiment.
     pub experiment: String,
-    /// What distinguishes the settings.
+    /// Label of the settings.
     pub label: String,
-    /// Whether its runs are beyond the plan.
+    /// Whether the runs are beyond the plan.
     pub is_beyond_plan: bool,
-    /// The settings, with the first seed.
+    /// The settings, including the first seed.
     pub settings: Settings,
-    /// Runs that are planned.
+    /// Number of planned runs.
     pub planned: usize,
-    /// Those that are finished, by seed.
+    /// The finished runs, by seed.
     pub runs: Vec<GatheredRun>,
 }
 
@@ -108,7 +109,7 @@ impl Group {
         self.runs.len() == self.planned
     }
 
-    /// Its settings, in words.
+    /// Returns the label of the settings, marked if the runs are beyond the plan.
     #[must_use]
     pub fn setting(&self) -> String {
         let beyond = if self.is_beyond_plan {
@@ -119,7 +120,7 @@ impl Group {
         format!("{}{beyond}", self.label)
     }
 
-    /// Returns how many of its runs are finished, in words.
+    /// Describes the number of finished runs.
     #[must_use]
     pub fn counted(&self) -> String {
         if self.is_complete() {
@@ -129,42 +130,42 @@ impl Group {
         }
     }
 
-    /// One number of every run.
+    /// Returns one number per run.
     pub fn values(&self, of: impl Fn(&GatheredRun) -> f64) -> Vec<f64> {
         self.runs.iter().map(of).collect()
     }
 }
 
-/// The structures that a genome formed from a new start, and the orientation of its lines.
+/// Result of a genome from a new start.
 #[derive(Clone, Debug)]
 pub struct NewStart {
     /// Fitness, 0 to 1.
     pub fitness: f64,
-    /// None without lines.
+    /// Orientation of the lines; `None` without lines.
     pub orientation: Option<LineOrientation>,
-    /// Structures.
+    /// The dominant structures.
     pub names: Vec<Structure>,
 }
 
-/// The best genomes of a group from new starts.
+/// Results of a group's best genomes from new starts.
 #[derive(Clone, Debug)]
 pub struct Reevaluated {
     /// Name of the re-evaluation.
     pub name: String,
-    /// New starts of each genome.
+    /// Number of new starts per genome.
     pub starts: u32,
     /// The experiment.
     pub experiment: String,
-    /// What distinguishes the settings.
+    /// Label of the settings.
     pub label: String,
-    /// Of every genome, its new starts.
+    /// Results of every genome, one per new start.
     pub genomes: Vec<Vec<NewStart>>,
     /// SHA-256 of all fitnesses and final poses, in order.
     pub hash: String,
 }
 
 impl Reevaluated {
-    /// Returns what each genome forms in more than half of its starts.
+    /// Returns the orientation that each genome forms in more than half of its starts.
     #[must_use]
     pub fn orientations(&self) -> Vec<Option<LineOrientation>> {
         let of_genome = |starts: &Vec<NewStart>| {
@@ -182,9 +183,9 @@ pub struct DamagedArea {
     pub name: char,
     /// The cells.
     pub rectangle: Rectangle,
-    /// After the removal, before it goes on.
+    /// Poses after the removal, before the run continues.
     pub before: Vec<Pose>,
-    /// After it went on.
+    /// Poses at the end of the continued run.
     pub after: Vec<Pose>,
     /// The result of removing robots.
     pub removed: ResilienceRow,
@@ -192,30 +193,30 @@ pub struct DamagedArea {
     pub repositioned: ResilienceRow,
 }
 
-/// A structure that was damaged.
+/// A run whose structure was damaged.
 #[derive(Clone, Debug)]
 pub struct Damaged {
-    /// The setting it evolved under.
+    /// Label of the settings that the run evolved with.
     pub label: String,
     /// The run.
     pub run: GatheredRun,
-    /// As it evolved.
+    /// Results of the run as evolved.
     pub initial: ResilienceRow,
-    /// From new starts.
+    /// Results from new starts.
     pub new_starts: ResilienceRow,
-    /// The areas that there are.
+    /// The damaged areas.
     pub areas: Vec<DamagedArea>,
 }
 
 impl Damaged {
-    /// Runs from new starts and after damage.
+    /// Returns the number of runs from new starts and after damage.
     #[must_use]
     pub fn repetitions(&self) -> usize {
         let rows = self.rows();
         rows.iter().skip(1).map(|(_, row)| row.fitness.len()).sum()
     }
 
-    /// SHA-256 of what became of them, in order.
+    /// Returns the SHA-256 of the outcomes of these runs, in order.
     #[must_use]
     pub fn hash(&self) -> String {
         let mut hash = Sha256::new();
@@ -225,7 +226,7 @@ impl Damaged {
         hex(&hash.finalize())
     }
 
-    /// Every row with its name.
+    /// Returns every row with its name.
     #[must_use]
     pub fn rows(&self) -> Vec<(String, &ResilienceRow)> {
         let mut rows = vec![
@@ -249,61 +250,63 @@ impl Damaged {
 /// The result of the same damage to all runs of the structure.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overall {
-    /// Runs after damage.
+    /// Number of runs after damage.
     pub repetitions: usize,
-    /// SHA-256 of what became of them, in order.
+    /// SHA-256 of the outcomes, in order.
     pub hash: String,
-    /// Areas of all runs.
+    /// Number of areas, summed over all runs.
     pub areas: usize,
-    /// Those after whose removal the share at the end was at least that at the start.
+    /// Number of areas after whose removal the share at the end was at least the share at the
+    /// start.
     pub removal_holds: usize,
-    /// The same after repositioning, of the mean shares.
+    /// Number of such areas after repositioning, by the mean shares.
     pub repositioning_holds: usize,
-    /// Mean gain from start to end after a removal, 0 to 1.
+    /// Mean gain in share from start to end after removal, as a fraction.
     pub removal_gain: f64,
-    /// The same after repositioning.
+    /// Mean gain in share from start to end after repositioning, as a fraction.
     pub repositioning_gain: f64,
 }
 
 /// A resilience experiment.
 #[derive(Clone, Debug)]
 pub struct Resilient {
-    /// What was asked for.
+    /// The experiment, as described in the suite.
     pub asked: Resilience,
     /// The structure.
     pub structure: Structure,
-    /// Finished runs looked through.
+    /// Number of finished runs that were searched.
     pub looked_through: usize,
-    /// Those named after the structure.
+    /// Number of runs that the structure dominates.
     pub named: usize,
-    /// If none of them is: the runs beyond the plan that were looked through.
+    /// Number of runs beyond the plan that were searched because no planned run has the structure.
     pub further: u32,
-    /// None if there is no run of the structure.
+    /// The damaged run; `None` if no run has the structure.
     pub damaged: Option<Damaged>,
-    /// All planned runs that are named after the structure.
+    /// Results of damage to all planned runs that the structure dominates.
     pub overall: Overall,
 }
 
-/// Everything that a report is about.
+/// The complete data of a report.
 #[derive(Clone, Debug)]
 pub struct Gathered {
     /// The evolutions.
     pub groups: Vec<Group>,
-    /// The runs beyond the plan that were looked through for a structure, by settings.
+    /// The runs beyond the plan that were searched for a structure, by settings.
     pub further: Vec<Group>,
     /// The re-evaluations.
     pub reevaluations: Vec<Reevaluated>,
     /// The resilience experiments.
     pub resiliences: Vec<Resilient>,
-    /// Runs that are left out.
+    /// Damaged runs, which are left out.
     pub damaged: DamagedRuns,
 }
 
 impl Gathered {
-    /// Reads the finished runs of a plan and makes of them what the suite asks for.
+    /// Reads the finished runs of a plan, and executes the suite's re-evaluations and damage
+    /// experiments.
     ///
     /// # Errors
-    /// [`GatherError`] if a finished run cannot be run again.
+    /// [`GatherError`] if a finished run cannot be executed again.
     pub fn read(plan: &Plan, suite: &Suite, directory: &Path) -> Result<Self, GatherError> {
         let (mut groups, mut damaged) = (Vec::new(), DamagedRuns::default());
         for experiment in &plan.experiments {
@@ -350,7 +353,7 @@ impl Gathered {
         })
     }
 
-    /// The runs of an experiment under some settings, if they are in the plan.
+    /// Returns the runs of an experiment with some settings, if they are in the plan.
     #[must_use]
     pub fn group(&self, experiment: &str, label: &str) -> Option<&Group> {
         self.groups
@@ -358,7 +361,7 @@ impl Gathered {
             .find(|group| group.experiment == experiment && group.label == label)
     }
 
-    /// The runs beyond the plan with the same settings as those of a group, if there are any.
+    /// Returns the runs beyond the plan with the same settings as a group, if any exist.
     #[must_use]
     pub fn further_of(&self, group: &Group) -> Option<&Group> {
         self.further.iter().find(|further| {
@@ -366,14 +369,14 @@ impl Gathered {
         })
     }
 
-    /// The directories of the planned runs that are done, in that of the suite.
+    /// Returns the directories of the planned runs that are done, in the suite's directory.
     #[must_use]
     pub fn directories(&self, suite: &Path) -> Vec<PathBuf> {
         let runs = self.groups.iter().flat_map(|group| &group.runs);
         runs.map(|run| suite.join(RUNS).join(&run.id)).collect()
     }
 
-    /// Names of the experiments, in order.
+    /// Returns the names of the experiments, in order.
     #[must_use]
     pub fn experiments(&self) -> Vec<&str> {
         let mut names: Vec<&str> = self.groups.iter().map(|g| g.experiment.as_str()).collect();
@@ -402,7 +405,7 @@ fn read_group(
     })
 }
 
-/// The first `number` runs beyond the plan of an experiment, by settings.
+/// Reads the first `number` runs beyond the plan of an experiment; groups them by settings.
 fn read_further(
     experiment: &PlannedExperiment,
     number: usize,
@@ -433,7 +436,7 @@ fn read_further(
     Ok(groups)
 }
 
-/// A run; none if it is not finished, or damaged.
+/// Reads a run; `None` if it is not finished or is damaged.
 fn read_run(
     planned: &PlannedRun,
     directory: &Path,
@@ -504,7 +507,7 @@ fn add_row(hash: &mut Sha256, row: &ResilienceRow) {
     }
 }
 
-/// A structure by its name in files.
+/// Looks up a structure by its name in files.
 pub(super) fn structure_named(name: &str) -> Option<Structure> {
     let spaced = name.replace('-', " ");
     Structure::ALL.into_iter().find(|s| s.name() == spaced)
@@ -532,7 +535,8 @@ fn damage(
         .copied()
         .filter(|(_, run)| run.names.contains(&structure))
         .collect();
-    // The first of the best: by share, then by seed, then in the plan's order.
+    // Choose the run with the largest share; ties go to the lowest seed, then to the first in the
+    // plan.
     let chosen = named.iter().copied().reduce(|best, next| {
         let key = |run: &GatheredRun| (run.share(structure), run.finished.settings.seed());
         let ((best_share, best_seed), (share, seed)) = (key(best.1), key(next.1));
@@ -642,7 +646,7 @@ fn damage_run(
     let (initial, new_starts) = match initial {
         Some(rows) => rows,
         None => {
-            // No area has that many robots; rows that need no area are still shown.
+            // No area has the requested number of robots; rows that need no area are still shown.
             let nowhere = Damage::Remove(Area::new(grid, 0, 0, 0, 0)?);
             let [first, starts, _] = three(rows(nowhere, asked.repeat)?);
             (first, starts)
@@ -659,17 +663,17 @@ fn damage_run(
 
 fn three(rows: Vec<ResilienceRow>) -> [ResilienceRow; 3] {
     rows.try_into()
-        .expect("as it evolved, from new starts, after damage")
+        .expect("three rows: as evolved, from new starts, after damage")
 }
 
-/// Mean share at the end less mean share at the start.
+/// Returns the mean share at the end minus the mean share at the start.
 #[must_use]
 pub fn regained(row: &ResilienceRow) -> f64 {
     mean(&row.share_end) - mean(&row.share_start)
 }
 
 impl Resilient {
-    /// The number of runs searched, in words.
+    /// Describes the number of runs searched.
     pub(super) fn counted(&self) -> String {
         match self.further {
             0 => plural(self.looked_through, "run"),
@@ -680,7 +684,7 @@ impl Resilient {
         }
     }
 
-    /// The result for all planned runs of the structure, in words; none without areas to damage.
+    /// Describes the result for all planned runs of the structure; `None` without areas to damage.
     pub(super) fn all_damaged(&self) -> Option<String> {
         let all = &self.overall;
         let damaged = match self.named {

@@ -1,4 +1,4 @@
-//! The report as one page that needs nothing else: pictures inline, no script, light and dark.
+//! The report as a self-contained HTML page: inline pictures, no script, light and dark mode.
 
 use super::contents::SuiteReport;
 use super::findings::Verdict;
@@ -25,10 +25,10 @@ figure { margin: 2em 0; overflow-x: auto; } figcaption { color: var(--soft); fon
 svg { max-width: 100%; height: auto; } code { font-size: .9em; overflow-wrap: anywhere; }
 ";
 
-/// Marks the page with the program that made it.
+/// Mark of the program that created the page.
 const MARK: &str = "<meta name=\"generator\" content=\"minimal-surprise-evolver\">";
 
-/// The whole page.
+/// Creates the whole page.
 #[must_use]
 pub fn page(report: &SuiteReport) -> String {
     let title = format!("Report of the suite {}", report.suite);
@@ -70,7 +70,7 @@ pub fn page(report: &SuiteReport) -> String {
     page
 }
 
-/// Markdown as HTML; HTML in it is text.
+/// Converts Markdown to HTML; escapes any HTML in it.
 fn rendered(markdown: &str) -> String {
     let mut page = String::new();
     let events = Parser::new(markdown).map(|event| match event {

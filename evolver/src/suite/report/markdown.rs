@@ -7,7 +7,7 @@ use super::wording::{SHARED, VERDICTS, heading, opening, reading, sentence, to_l
 use minimal_surprise_evolution::text::{markdown, markdown_code_cell};
 use std::fmt::Write;
 
-/// The whole report.
+/// Creates the whole report.
 #[must_use]
 pub fn text(report: &SuiteReport) -> String {
     let mut text = format!("# Report of the suite {}\n", markdown(&report.suite));

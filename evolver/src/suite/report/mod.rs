@@ -1,9 +1,7 @@
-//! The report of a suite: its tables, figures and findings beside the paper's, with intervals and
-//! tests.
-//!
-//! [`gather`] reads the finished runs, and runs again what is re-evaluated and damaged; [`tables`],
-//! [`figures`] and [`findings`] compute from that and from the numbers of [`paper`]; [`contents`] is
-//! all of it together, which [`mod@markdown`] and [`html`] write.
+//! The report of a suite: its tables, figures and findings compared with the paper's, with
+//! intervals and tests. [`gather`] reads the finished runs and executes re-evaluations and damage
+//! experiments; [`tables`], [`figures`] and [`findings`] evaluate them with the numbers of
+//! [`paper`]; [`contents`] combines the results, which [`mod@markdown`] and [`html`] write.
 
 pub mod contents;
 pub mod damage_areas;
@@ -28,17 +26,17 @@ use numbers::csv_text;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// What people found out about differences, in the report's folder.
+/// File with the user's notes on differences, in the report's folder.
 const LOOKED_INTO: &str = "looked-into.md";
 
-/// A report cannot be made.
+/// The reason why a report cannot be created.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
     /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A run cannot be run again.
+    /// A run cannot be read or executed again.
     #[error(transparent)]
     Gather(#[from] GatherError),
     /// A figure cannot be drawn.
@@ -46,32 +44,32 @@ pub enum ReportError {
     Figure(#[from] FigureError),
 }
 
-/// What was written.
+/// The files and numbers of runs of a written report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// The report as a page.
+    /// Path of the HTML page.
     pub html: PathBuf,
-    /// The report as text.
+    /// Path of the Markdown text.
     pub markdown: PathBuf,
-    /// Every file.
+    /// Paths of all files.
     pub files: Vec<PathBuf>,
-    /// Runs that are finished, each experiment's counted.
+    /// Number of finished runs, summed over all experiments.
     pub finished: usize,
-    /// Runs that are planned.
+    /// Number of planned runs.
     pub planned: usize,
 }
 
-/// Where a report links to, in its directory, if there is a gallery of its runs.
+/// Name of the gallery's folder, in the report's directory.
 pub const GALLERY: &str = "gallery";
 
-/// Marks a directory as a report, which another report may replace.
+/// File that marks a directory as a report, which a new report may replace.
 const MARKER: &str = ".evolver-report";
 
-/// Whether a report would replace nothing but a report: the directory is new, marked as that of a
-/// report, or empty but for what is to be said in the report. A gallery in it must be marked, too.
+/// Returns whether a report would replace only a report: the directory must be new, marked as a
+/// report, or empty except for notes and a gallery. A gallery in the directory must also be marked.
 ///
 /// # Errors
-/// [`FileError`] if it cannot be read.
+/// [`FileError`] if the directory cannot be read.
 pub fn may_be_written(out: &Path) -> Result<bool, FileError> {
     let entries = match std::fs::read_dir(out) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(true),
@@ -93,10 +91,10 @@ pub fn may_be_written(out: &Path) -> Result<bool, FileError> {
     Ok(true)
 }
 
-/// Writes the report of gathered runs, with the data of its tables and figures as CSV. `out` is the
-/// directory of the report, which is made; `called` is how the program was called with this suite,
-/// for the commands in it. If `out` has a
-/// `looked-into.md`, its text comes after the differences: paragraphs, and list items with a dash.
+/// Writes the report of gathered runs, with the data of its tables and figures as CSV. Creates the
+/// directory `out`; `called` is the command line prefix for the commands in the report. If `out`
+/// contains `looked-into.md`, its text is inserted after the differences: paragraphs, and list
+/// items with a dash.
 ///
 /// # Errors
 /// [`ReportError`] if a file cannot be written.
@@ -272,7 +270,7 @@ mod tests {
         assert!(figures.is_sorted(), "{figures:?}");
     }
 
-    /// The numbers of a table's CSV by setting and column.
+    /// Reads the numbers of a table's CSV, by setting and column.
     fn ours(out: &Path, table: &str) -> BTreeMap<(String, String), f64> {
         let mut reader = csv::Reader::from_path(out.join(table)).unwrap();
         let rows = reader.deserialize::<BTreeMap<String, String>>();
@@ -313,7 +311,7 @@ mod tests {
         );
         assert!(
             !markdown.contains("differs"),
-            "there is no paper to differ from"
+            "without a paper, nothing differs"
         );
         let files: BTreeSet<_> = written.files.iter().collect();
         assert_eq!(files.len(), written.files.len(), "no file is written twice");
@@ -329,9 +327,12 @@ mod tests {
             );
         }
         for again in ["| again | two: ", "| damage | two: "] {
-            assert!(markdown.contains(again), "{again} is made, too");
+            assert!(markdown.contains(again), "{again} has a provenance too");
         }
-        assert!(!markdown.contains("paper's"), "and none to speak of");
+        assert!(
+            !markdown.contains("paper's"),
+            "no number of a paper is shown"
+        );
         assert!(markdown.contains("Percentage of new starts"), "{markdown}");
         let page = std::fs::read_to_string(&written.html).unwrap();
         assert!(page.contains("<svg") && !page.contains("src="));

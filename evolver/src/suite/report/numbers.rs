@@ -1,14 +1,14 @@
-//! Numbers in words, and rows as CSV.
+//! Formatting of numbers, and rows as CSV.
 
 use serde::Serialize;
 
-/// A number and its noun, plural where needed.
+/// Formats a number with its noun, in the plural if needed.
 pub(super) fn plural(number: usize, what: &str) -> String {
     let s = if number == 1 { "" } else { "s" };
     format!("{number} {what}{s}")
 }
 
-/// A number with this many digits after the point, without a sign if it is zero.
+/// Formats a number with `digits` decimals, without a sign if it rounds to zero.
 pub(super) fn number(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     match text.strip_prefix('-') {
@@ -17,7 +17,7 @@ pub(super) fn number(value: f64, digits: usize) -> String {
     }
 }
 
-/// A p-value in words.
+/// Formats a p-value.
 pub(super) fn p_value(p: f64) -> String {
     if p < 0.001 {
         "p < 0.001".to_owned()

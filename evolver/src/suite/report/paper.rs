@@ -6,38 +6,38 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// All of them.
+/// All numbers of the paper that the report compares with.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PaperValues {
-    /// Shares of runs.
+    /// Distributions of runs over categories.
     #[serde(rename = "distribution")]
     pub distributions: Vec<Distribution>,
     /// Single numbers.
     #[serde(rename = "number")]
     pub numbers: Vec<Number>,
-    /// What runs of a structure are like.
+    /// Measures of the runs of each structure.
     #[serde(rename = "structure")]
     pub structures: Vec<StructureValues>,
     /// Results of damage to structures.
     #[serde(rename = "damage")]
     pub damages: Vec<DamageValues>,
-    /// By how much partly predefining a line raises the share of line runs.
+    /// Increases in the share of line runs by partly predefining a line.
     pub raised: Vec<Raised>,
 }
 
-/// Where in the paper numbers are.
+/// Place of a number in the paper.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
 pub enum Source {
-    /// In the text of a section.
+    /// Text of a section.
     Section(String),
-    /// In a table.
+    /// Table.
     Table(u32),
 }
 
 impl Source {
-    /// A name for a file of its numbers.
+    /// Returns a name for a file of the numbers from this source.
     #[must_use]
     pub fn file_name(&self) -> String {
         match self {
@@ -69,16 +69,16 @@ impl TryFrom<String> for Source {
     }
 }
 
-/// What the shares of a distribution are of.
+/// Items counted by a distribution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Of {
-    /// Runs, by the structure they are named after.
+    /// Runs, by dominant structure.
     #[default]
     Structures,
-    /// Runs, by the way their lines go.
+    /// Runs, by line orientation.
     Orientation,
-    /// Genomes, by the way their lines go from most of their new starts.
+    /// Genomes, by line orientation in most of their new starts.
     #[serde(rename = "new starts")]
     NewStarts,
 }
@@ -87,38 +87,38 @@ pub enum Of {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Distribution {
-    /// Table or section.
+    /// Table or section of the paper.
     pub source: Source,
-    /// Another table that repeats it.
+    /// A second table that repeats the distribution.
     pub also: Option<Source>,
     /// The experiment.
     pub experiment: String,
     /// The label of the setting.
     pub setting: String,
-    /// What of.
+    /// Items counted.
     #[serde(default)]
     pub of: Of,
     /// Number of runs.
     pub runs: u32,
-    /// What to know about it.
+    /// Note on the distribution.
     pub note: Option<String>,
-    /// The shares as printed.
+    /// The shares in percent, as printed.
     pub percent: BTreeMap<String, f64>,
 }
 
 impl Distribution {
-    /// The paper's share of a category, in percent; those not printed are 0.
+    /// Returns the paper's share of a category, in percent; 0 if it is not printed.
     #[must_use]
     pub fn percent(&self, category: &str) -> f64 {
         self.percent.get(category).copied().unwrap_or(0.0)
     }
 
-    /// Whole runs of each of the categories: a tied run, printed as parts, counts for the first of
-    /// them.
+    /// Converts the shares to whole runs per category; a tied run, printed as fractions, counts for
+    /// the first of its categories.
     #[must_use]
     pub fn runs(&self, categories: &[String]) -> Vec<u32> {
         let exact = |category: &String| self.percent(category) / 100.0 * f64::from(self.runs);
-        // Shares are printed to the half percent, so that anything below a fifth is rounding.
+        // Shares are printed to half a percent, so a remainder below a fifth of a run is rounding.
         let mut counts: Vec<u32> = categories
             .iter()
             .map(|category| (exact(category) + 0.2).floor() as u32)
@@ -139,17 +139,17 @@ impl Distribution {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Number {
-    /// Table or section.
+    /// Table or section of the paper.
     pub source: Source,
     /// The experiment.
     pub experiment: String,
     /// The label of the setting.
     pub setting: String,
-    /// What it is.
+    /// Name of the measure.
     pub measure: String,
     /// The number.
     pub value: f64,
-    /// One in its last digit.
+    /// Value of one unit in the last printed digit.
     pub last_digit: f64,
 }
 
@@ -163,11 +163,11 @@ pub struct MeanMedian {
     pub median: Option<f64>,
 }
 
-/// What runs of a structure are like.
+/// Measures of the runs of a structure.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct StructureValues {
-    /// Table.
+    /// Table of the paper.
     pub source: Source,
     /// The experiment.
     pub experiment: String,
@@ -175,7 +175,7 @@ pub struct StructureValues {
     pub setting: String,
     /// The structure.
     pub structure: String,
-    /// Robots in it, in percent.
+    /// Robots in the structure, in percent.
     pub robots_percent: MeanMedian,
     /// Fitness.
     pub fitness: MeanMedian,
@@ -189,11 +189,11 @@ pub struct StructureValues {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DamageValues {
-    /// Table.
+    /// Table of the paper.
     pub source: Source,
     /// The resilience experiment.
     pub resilience: String,
-    /// What was done.
+    /// Name of the row, which describes the damage.
     pub row: String,
     /// Fitness.
     pub fitness: MeanMedian,
@@ -205,24 +205,24 @@ pub struct DamageValues {
     pub similarity: MeanMedian,
 }
 
-/// By how many points a share was raised.
+/// Increase of a share.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Raised {
-    /// Section.
+    /// Section of the paper.
     pub source: Source,
     /// The grid.
     pub grid: String,
-    /// Percentage points.
+    /// Increase in percentage points.
     pub points: f64,
 }
 
 impl PaperValues {
-    /// The paper's numbers for a suite: all for the paper's, none for another.
+    /// Returns the numbers to compare with: all for the paper's suite, none for other suites.
     #[must_use]
     pub fn for_suite(reference: Option<Reference>) -> Self {
         let all: Self = toml::from_str(include_str!("../paper-values.toml"))
-            .expect("a test reads the file that is built in");
+            .expect("a test parses the built-in file");
         match reference {
             Some(Reference::Paper) => all,
             None => Self::none(),
@@ -239,7 +239,7 @@ impl PaperValues {
         }
     }
 
-    /// A distribution.
+    /// Looks up a distribution by items, experiment and setting.
     #[must_use]
     pub fn distribution(&self, of: Of, experiment: &str, setting: &str) -> Option<&Distribution> {
         self.distributions
@@ -259,10 +259,10 @@ impl PaperValues {
 /// The grid of the damaged structures in Tables 7 and 8.
 pub const DAMAGED_GRID: &str = "15x15";
 
-/// The three groupings together.
+/// Category of all three groupings together.
 pub const GROUPING: &str = "grouping";
 
-/// Runs named after no structure.
+/// Category of runs without a dominant structure.
 pub const NONE: &str = "none";
 
 /// Returns whether a structure is one of the three groupings.

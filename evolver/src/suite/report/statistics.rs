@@ -1,6 +1,5 @@
-//! Intervals and tests: how sure a number is, and whether two findings may be the same.
-//!
-//! Everything random has a fixed seed, so that the same runs give the same report.
+//! Statistical intervals and tests. All random draws use a fixed seed, so that the same runs give
+//! the same report.
 
 use minimal_surprise_evolution::reevaluation::median;
 use minimal_surprise_sim::seed::uniform_below;
@@ -9,27 +8,28 @@ use rand_chacha::rand_core::SeedableRng;
 use statrs::distribution::{Binomial, ContinuousCDF, Discrete, DiscreteCDF, Normal};
 use statrs::function::factorial::ln_factorial;
 
-/// Seed of everything drawn here.
+/// Seed of all random draws in this module.
 const SEED: u64 = 2021;
-/// Resamples of a bootstrap.
+/// Number of resamples of a bootstrap.
 const RESAMPLES: usize = 10_000;
 /// Maximum number of tables that an exact test enumerates; above it, tables are sampled at random.
 const EXACT_TABLES_MAX: u64 = 3_000_000;
-/// Tables drawn where there are too many for an exact test.
+/// Number of tables drawn if an exact test would have too many.
 const DRAWN_TABLES: u32 = 100_000;
-/// Normal quantile of a two-sided 95 % interval.
+/// Normal quantile for a two-sided 95 % interval.
 const Z_95: f64 = 1.959_963_984_540_054;
-/// A test below this speaks against two findings being the same.
+/// Significance level: a difference with a smaller p-value is significant.
 pub const SIGNIFICANT: f64 = 0.05;
-/// Fewer runs say nothing about a median, however near they lie: with five, all of them are on one
-/// side of it in every sixteenth case.
+/// Minimum number of runs for a test of a median: five runs are all on one side of it by chance in
+/// one of sixteen cases, so p < 0.05 is impossible.
 pub const RUNS_MIN: usize = 6;
 /// Name of the sign test.
 pub const SIGN_TEST: &str = "sign test";
-/// Two probabilities of tables this much apart, relatively, are the same but for rounding.
+/// Relative difference below which two probabilities of tables are considered equal, because of
+/// rounding.
 const SAME_PROBABILITY: f64 = 1e-7;
 
-/// A range with its ends.
+/// An interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// Lower end.
@@ -41,9 +41,9 @@ pub struct Interval {
 /// A test's name and its result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Test {
-    /// Its name.
+    /// Name of the test.
     pub name: &'static str,
-    /// Probability of something at least as extreme if there is no difference.
+    /// Probability of a result at least as extreme if there is no difference.
     pub p: f64,
 }
 
@@ -55,7 +55,8 @@ impl Test {
     }
 }
 
-/// Wilson's 95 % interval of a share; tied runs make halves of successes. None of nothing.
+/// Computes Wilson's 95 % interval of a share; tied runs may be fractions of successes. Returns
+/// `None` if `of` is 0.
 #[must_use]
 pub fn wilson(successes: f64, of: f64) -> Option<Interval> {
     if of <= 0.0 {
@@ -71,7 +72,8 @@ pub fn wilson(successes: f64, of: f64) -> Option<Interval> {
     })
 }
 
-/// 95 % interval of a median: 2.5 and 97.5 % quantile of the medians of resamples. None of nothing.
+/// Computes the 95 % interval of a median: the 2.5 % and 97.5 % quantiles of the medians of
+/// resamples. Returns `None` without values.
 #[must_use]
 pub fn median_interval(values: &[f64]) -> Option<Interval> {
     if values.is_empty() {
@@ -106,9 +108,9 @@ pub fn quantile(ascending: &[f64], share: f64) -> f64 {
     ascending[below] + (place - below as f64) * (ascending[above] - ascending[below])
 }
 
-/// Whether two rows of counts may come from the same distribution: Fisher's exact test in Freeman
-/// and Halton's form for 2 × c tables, by looking at every table with the same margins; if those are
-/// too many, by drawing such tables. 1 if a row or all but one column are empty.
+/// Tests whether two rows of counts may come from the same distribution: Fisher's exact test in
+/// Freeman and Halton's form for 2 × c tables. Enumerates all tables with the same margins, or
+/// draws such tables if there are too many. p is 1 if a row or all but one column are empty.
 #[must_use]
 pub fn fisher(first: &[u32], second: &[u32]) -> Test {
     assert_eq!(first.len(), second.len(), "both rows have the same columns");
@@ -146,7 +148,7 @@ fn ln_choose(of: u32, chosen: u32) -> f64 {
 }
 
 fn exact(totals: &[u32], row: u32, observed: f64) -> f64 {
-    // The largest column last: it is what the others leave.
+    // Put the largest column last, since its count follows from the others.
     let mut totals = totals.to_vec();
     totals.sort_unstable();
     let all: u32 = totals.iter().sum();
@@ -162,7 +164,8 @@ fn exact(totals: &[u32], row: u32, observed: f64) -> f64 {
     p.min(1.0)
 }
 
-/// Shows the logarithm of the number of ways of every first row with this sum.
+/// Calls `visit` for every first row with this sum, with the logarithm of its number of
+/// arrangements.
 fn every_table(totals: &[u32], row: u32, ways: f64, visit: &mut impl FnMut(f64)) {
     match totals {
         [] if row == 0 => visit(ways),
@@ -201,7 +204,7 @@ fn drawn(totals: &[u32], row: u32, observed: f64) -> f64 {
     f64::from(extreme + 1) / f64::from(DRAWN_TABLES + 1)
 }
 
-/// Returns whether successes and failures may be equally likely: exact binomial test, two-sided.
+/// Tests whether successes and failures may be equally likely: exact binomial test, two-sided.
 #[must_use]
 pub fn sign(successes: u32, failures: u32) -> Test {
     let of = u64::from(successes) + u64::from(failures);
@@ -213,8 +216,8 @@ pub fn sign(successes: u32, failures: u32) -> Test {
     Test { name: SIGN_TEST, p }
 }
 
-/// Whether a median may be this value, given to within half a unit of its last digit: sign test,
-/// two-sided; values within the rounding speak neither for a larger nor for a smaller median.
+/// Tests whether a median may be this value, known to within `rounding`: sign test, two-sided.
+/// Values within the rounding count neither for a larger nor for a smaller median.
 #[must_use]
 pub fn median_is(values: &[f64], median: f64, rounding: f64) -> Test {
     let above = values.iter().filter(|&&v| v > median + rounding).count();
@@ -227,8 +230,8 @@ pub fn median_is(values: &[f64], median: f64, rounding: f64) -> Test {
     Test { name: SIGN_TEST, p }
 }
 
-/// Whether one sample tends to larger values than the other: Mann and Whitney's test, two-sided,
-/// normal approximation with correction for ties and continuity.
+/// Tests whether one sample tends to larger values than the other: Mann and Whitney's test,
+/// two-sided, normal approximation with correction for ties and continuity.
 #[must_use]
 pub fn mann_whitney(first: &[f64], second: &[f64]) -> Test {
     let (n, m) = (first.len() as f64, second.len() as f64);
@@ -291,10 +294,11 @@ mod tests {
 
     #[test]
     fn fisher_gives_the_published_values() {
-        // Fisher's tea tasting, and R's documentation of the convictions of twins.
+        // Examples: Fisher's tea tasting, and the convictions of twins in R's documentation.
         assert_close(fisher(&[3, 1], &[1, 3]).p, 0.485_714, 1e-6);
         assert_close(fisher(&[2, 15], &[10, 3]).p, 0.000_536_7, 1e-7);
-        // By hand: 3 | 0 0 against 0 | 2 1; of the 20 tables' ways, those of 1 or fewer.
+        // By hand: 3 | 0 0 against 0 | 2 1; of 20 arrangements in total, those of tables with at
+        // most 1.
         assert_close(fisher(&[3, 0, 0], &[0, 2, 1]).p, 0.1, 1e-9);
         assert_eq!(fisher(&[4, 0], &[9, 0]).p, 1.0);
         assert_eq!(fisher(&[0, 0], &[9, 1]).p, 1.0);
@@ -324,7 +328,8 @@ mod tests {
     fn a_median_is_told_by_the_values_beyond_its_rounding() {
         assert_close(median_is(&[0.1, 0.2, 0.31, 0.9], 0.3, 0.02).p, 1.0, 1e-9);
         assert_close(median_is(&[0.4; 9], 0.3, 0.02).p, 2.0 / 512.0, 1e-9);
-        // Seven of twenty above, none below, the others as printed: the median is as printed too.
+        // Seven of twenty values are above, none below, the others as printed: the median is as
+        // printed.
         let mut values = [0.0; 20];
         values[..7].fill(0.5);
         assert_eq!(median_is(&values, 0.0, 0.005).p, 1.0);
@@ -351,7 +356,7 @@ mod tests {
         let values: Vec<f64> = (0..41).map(f64::from).collect();
         let interval = median_interval(&values).unwrap();
         assert_eq!(median_interval(&values), Some(interval));
-        // Order statistics 14 and 28 of 41, the values 13 and 27, hold it with 97.2 %.
+        // Order statistics 14 and 28 of 41, the values 13 and 27, contain the median with 97.2 %.
         assert_close(interval.low, 13.0, 1.5);
         assert_close(interval.high, 27.0, 1.5);
         assert_eq!(median_interval(&[]), None);

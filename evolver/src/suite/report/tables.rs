@@ -1,4 +1,4 @@
-//! The paper's tables with our numbers, the paper's, intervals and tests.
+//! The paper's tables with our numbers, the paper's numbers, intervals and tests.
 
 use super::gather::{
     Gathered, GatheredRun, Group, NewStart, Reevaluated, Resilient, structure_named,
@@ -19,37 +19,37 @@ use serde::Serialize;
 /// Name of the measure that the paper gives for most settings.
 pub const MEDIAN_BEST_FITNESS: &str = "median best fitness";
 
-/// Genomes whose lines go no way in most of their new starts.
+/// Category of genomes without one line orientation in most of their new starts.
 const DIVERSE: &str = "diverse";
 
-/// A number of ours beside the paper's.
+/// One of our numbers with the paper's number.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Value {
-    /// Row and what it is made of.
+    /// The row, with its experiment.
     pub setting: String,
-    /// Column.
+    /// The column.
     pub what: String,
-    /// Runs, genomes or repetitions that it is of.
+    /// Number of runs, genomes or repetitions behind our number.
     pub of: usize,
     /// Our number.
     pub ours: Option<f64>,
-    /// Our median, where the number is a mean.
+    /// Our median, if the number is a mean.
     pub ours_median: Option<f64>,
     /// Lower end of the 95 % interval.
     pub low: Option<f64>,
-    /// Upper end.
+    /// Upper end of the 95 % interval.
     pub high: Option<f64>,
     /// The paper's number.
     pub paper: Option<f64>,
-    /// The paper's median, where the number is a mean.
+    /// The paper's median, if the number is a mean.
     pub paper_median: Option<f64>,
-    /// The test of whether both may be the same.
+    /// Name of the test for a difference between both numbers.
     pub test: Option<&'static str>,
-    /// Its p-value.
+    /// The test's p-value.
     pub p: Option<f64>,
-    /// Whether it does not speak against it.
+    /// Whether the test finds no significant difference.
     pub compatible: Option<bool>,
-    /// Digits after the point, for showing.
+    /// Number of decimals to print.
     #[serde(skip)]
     pub digits: usize,
 }
@@ -63,13 +63,13 @@ impl Value {
         }
     }
 
-    /// Returns whether it is of a test that could have found a difference.
+    /// Returns whether the test could have found a difference.
     pub fn could_differ(&self) -> bool {
         let too_few = self.test == Some(SIGN_TEST) && self.of < RUNS_MIN;
         self.p.is_some() && !too_few
     }
 
-    /// Returns whether it is the same as another, from another table.
+    /// Returns whether a value from a different table is the same.
     pub fn repeats(&self, other: &Self) -> bool {
         (&self.setting, &self.what) == (&other.setting, &other.what)
             && (self.of, self.ours, self.paper, self.p)
@@ -95,37 +95,37 @@ impl Value {
 pub struct Row {
     /// The setting.
     pub name: String,
-    /// How many of its runs there are.
+    /// Description of the number of finished runs.
     pub counted: String,
-    /// Its numbers, one per column; none where there is no number.
+    /// The row's values, one per column; `None` for an empty cell.
     pub values: Vec<Option<Value>>,
 }
 
 /// A table.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// Name of its file.
+    /// Name of the table's file.
     pub id: String,
-    /// Table or section of the paper; empty if there is none.
+    /// Table or section of the paper; empty if the paper has no such table.
     pub source: String,
-    /// What it shows.
+    /// The title.
     pub title: String,
-    /// How to read it.
+    /// Notes on the table.
     pub notes: Vec<String>,
-    /// Columns.
+    /// Names of the columns.
     pub columns: Vec<String>,
-    /// Rows.
+    /// The rows.
     pub rows: Vec<Row>,
 }
 
 impl Table {
-    /// Every number.
+    /// Returns every value of the table.
     pub fn values(&self) -> impl Iterator<Item = &Value> {
         self.rows.iter().flat_map(|row| row.values.iter().flatten())
     }
 }
 
-/// What the tables' shares of runs are of: each run's categories, several if tied.
+/// Data of a row of shares: each run's categories, several if tied.
 struct Shared<'a> {
     name: String,
     setting: String,
@@ -136,7 +136,7 @@ struct Shared<'a> {
 }
 
 impl Shared<'_> {
-    /// Returns whether a category is one of these: the groupings are told apart or are not.
+    /// Returns whether the row has a category; groupings are either separate or combined.
     fn has(&self, category: &str) -> bool {
         let together = self.paper.is_some_and(|d| d.percent.contains_key(GROUPING));
         if category == GROUPING {
@@ -149,7 +149,7 @@ impl Shared<'_> {
     }
 }
 
-/// All tables.
+/// Creates all tables.
 #[must_use]
 pub fn all(gathered: &Gathered, paper: &PaperValues) -> Vec<Table> {
     let mut tables = Vec::new();
@@ -171,8 +171,8 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Vec<Table> {
     tables
 }
 
-/// Structures that runs are named after: a table for each of the paper's, and one for settings
-/// that it does not have.
+/// Creates the tables of dominant structures: one for each of the paper's, and one for settings
+/// that are not in the paper.
 fn structure_tables(
     experiment: &str,
     groups: &[&Group],
@@ -183,7 +183,7 @@ fn structure_tables(
         |group: &Group| paper.distribution(Of::Structures, &group.experiment, &group.label);
     let source_of = |group: &Group| of_paper(group).map(|d| &d.source);
     let mut sources: Vec<Option<&Source>> = groups.iter().map(|group| source_of(group)).collect();
-    // By their names; what the paper does not have comes last.
+    // Sort by name; settings that are not in the paper come last.
     sources.sort_by_key(|source| (source.is_none(), in_words(*source)));
     sources.dedup();
     let tables = sources.into_iter().filter_map(|source| {
@@ -208,7 +208,7 @@ fn structure_tables(
         let id = match source {
             None => format!("structures-{experiment}"),
             Some(table @ Source::Table(_)) => table.file_name(),
-            // Several experiments may be told of in a section.
+            // A section may describe several experiments.
             Some(section) => format!("{}-{experiment}", section.file_name()),
         };
         let title =
@@ -227,12 +227,12 @@ fn structure_tables(
     tables.collect()
 }
 
-/// The source of a table in words; none if the paper has no such numbers.
+/// Formats the source of a table; empty if the paper has no such numbers.
 fn in_words(source: Option<&Source>) -> String {
     source.map(Source::to_string).unwrap_or_default()
 }
 
-/// The categories of every run; the groupings together if the paper has them so.
+/// Returns the categories of every run; combines the groupings if the paper does.
 fn structure_categories(group: &Group, paper: Option<&Distribution>) -> Vec<Vec<String>> {
     let together = paper.is_some_and(|d| d.percent.contains_key(GROUPING));
     let name = |structure: &Structure| {
@@ -252,7 +252,7 @@ fn structure_categories(group: &Group, paper: Option<&Distribution>) -> Vec<Vec<
         .collect()
 }
 
-/// The structures that come up, in the paper's order.
+/// Returns the structures that occur, in the paper's order.
 fn structure_order(shared: &[Shared<'_>]) -> Vec<String> {
     let names = Structure::ALL.iter().map(|s| s.name());
     let mut order: Vec<String> = names.map(str::to_owned).collect();
@@ -271,14 +271,14 @@ fn structure_order(shared: &[Shared<'_>]) -> Vec<String> {
     order
 }
 
-/// What the percentages of a table are of.
+/// Items counted by the percentages of a table.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Counted {
     /// Runs; a tied run counts as a fraction for each of its structures.
     TiedRuns,
-    /// Runs, and genomes by most of their new starts.
+    /// Runs; and genomes, by the majority of their new starts.
     RunsAndGenomes,
-    /// New starts, which structures share.
+    /// New starts; a tied start counts as a fraction for each of its structures.
     TiedStarts,
 }
 
@@ -354,7 +354,7 @@ fn share_table(
     }
 }
 
-/// Returns how many runs form any of the groupings, if the paper tells them apart.
+/// Describes the share of runs that form any of the groupings, if the paper separates them.
 fn groupings_together(shared: &Shared<'_>) -> Option<String> {
     let paper = shared.paper.filter(|_| shared.of == Of::Structures)?;
     let groupings = Structure::ALL.into_iter().filter(|s| is_grouping(*s));
@@ -374,7 +374,7 @@ fn groupings_together(shared: &Shared<'_>) -> Option<String> {
     })
 }
 
-/// Share of runs in a category, in percent.
+/// Computes the share of runs in a category, in percent.
 fn share(shared: &Shared<'_>, category: &str) -> Value {
     let count: f64 = shared
         .runs
@@ -395,7 +395,7 @@ fn share(shared: &Shared<'_>, category: &str) -> Value {
     .within(wilson(count, of as f64), 100.0)
 }
 
-/// Our distribution against the paper's.
+/// Tests our distribution against the paper's.
 fn distribution_test(shared: &Shared<'_>, categories: &[String]) -> Option<Value> {
     let paper = shared.paper?;
     let value = Value {
@@ -418,7 +418,7 @@ fn distribution_test(shared: &Shared<'_>, categories: &[String]) -> Option<Value
     Some(value.tested(fisher(&ours, &paper.runs(categories))))
 }
 
-/// A median against the paper's.
+/// Computes a median with its interval.
 fn median_value(setting: &str, what: &str, values: &[f64], digits: usize) -> Value {
     Value {
         of: values.len(),
@@ -429,7 +429,7 @@ fn median_value(setting: &str, what: &str, values: &[f64], digits: usize) -> Val
     .within(median_interval(values), 1.0)
 }
 
-/// Tables 4 and 5 below their first row: what the runs of each structure are like.
+/// Creates Tables 4 and 5 below their first row: measures of the runs of each structure.
 fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table> {
     let of_paper = |structure: Structure| {
         paper.structures.iter().find(|values| {
@@ -523,7 +523,7 @@ fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table> {
     })
 }
 
-/// What a share of runs is of.
+/// Runs that a share refers to.
 #[derive(Clone, Copy)]
 enum Among {
     LineRuns,
@@ -538,7 +538,7 @@ impl Among {
         }
     }
 
-    /// Returns how many of the paper's runs these are.
+    /// Returns the number of these runs in the paper.
     fn of_paper(self, shares: &Distribution) -> u32 {
         match self {
             Self::LineRuns => {
@@ -550,7 +550,8 @@ impl Among {
     }
 }
 
-/// Numbers that the paper gives in its text, and the median best fitness of every setting.
+/// Creates the table of numbers from the paper's text, with the median best fitness of every
+/// setting.
 fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<Table> {
     type Values = fn(&Group) -> Vec<f64>;
     let medians: [(&str, usize, Values); 3] = [
@@ -692,7 +693,7 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
     })
 }
 
-/// Sensors that the prediction network of a run predicts, on average, more often occupied than not.
+/// Returns the number of sensors whose average prediction in a run is above 0.5.
 fn sensors_predicted_often(run: &GatheredRun) -> usize {
     let predicted = run.finished.settings.topology().predicted();
     let averages = run.finished.average_prediction.iter().enumerate();
@@ -701,7 +702,7 @@ fn sensors_predicted_often(run: &GatheredRun) -> usize {
         .count()
 }
 
-/// Table 6: which way the lines go, in the runs and from new starts.
+/// Creates Table 6: line orientations, in the runs and from new starts.
 fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
     let is_line = |group: &&Group| {
         group.settings.topology().prediction() == Prediction::Predefined(Template::Line)
@@ -783,7 +784,7 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
     Some(table)
 }
 
-/// Returns what the genomes of every setting formed from new starts.
+/// Creates the table of structures that the genomes of every setting formed from new starts.
 fn new_starts(gathered: &Gathered) -> Option<Table> {
     let done = gathered
         .reevaluations
@@ -838,7 +839,7 @@ fn new_starts(gathered: &Gathered) -> Option<Table> {
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// Tables 7 and 8.
+/// Creates Tables 7 and 8.
 fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
     let name = &resilient.asked.name;
     let of_paper: Vec<_> = paper
@@ -938,7 +939,7 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
         ));
     }
     Table {
-        // The figure has the name itself.
+        // The figure already uses `name` as its ID.
         id: source.map_or_else(|| format!("numbers-{name}"), Source::file_name),
         source: in_words(source),
         title: format!("{name}: effect of damage on a {}", resilient.structure),
@@ -949,7 +950,7 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
 }
 
 impl Value {
-    /// Our number, with the median in brackets if it is a mean.
+    /// Formats our number, with the median in brackets if it is a mean.
     pub(super) fn ours_in_words(&self) -> Option<String> {
         let mean = number(self.ours?, self.digits);
         Some(match self.ours_median {
@@ -958,7 +959,7 @@ impl Value {
         })
     }
 
-    /// The paper's number, likewise, with the digits that it has there.
+    /// Formats the paper's number in the same way, with the digits printed there.
     pub(super) fn theirs_in_words(&self) -> Option<String> {
         let paper = self.paper?;
         Some(match self.paper_median {
@@ -967,7 +968,7 @@ impl Value {
         })
     }
 
-    /// The 95 % interval.
+    /// Formats the 95 % interval.
     pub(super) fn interval_in_words(&self) -> Option<String> {
         let (low, high) = (self.low?, self.high?);
         Some(format!(
@@ -977,7 +978,7 @@ impl Value {
         ))
     }
 
-    /// Returns what the test says.
+    /// Describes the result of the test.
     pub(super) fn verdict_in_words(&self) -> Option<String> {
         let compatible = if self.compatible? {
             "compatible"

@@ -1,4 +1,4 @@
-//! What a report says around its tables, findings and figures, in Markdown; the same for every format.
+//! Text around the report's tables, findings and figures, in Markdown; the same for every format.
 
 use super::contents::SuiteReport;
 use super::numbers::plural;
@@ -7,24 +7,24 @@ use super::tables::Table;
 use minimal_surprise_evolution::text::{markdown, markdown_code};
 use std::fmt::Write;
 
-/// Written before the findings.
+/// Text before the findings.
 pub(super) const VERDICTS: &str = "*Holds* and *differs* say whether the statement, as worded, is \
                                    true of our runs. The p-value stands beside it and only tells \
                                    whether a tendency may be chance: one that is seen with p ≥ 0.05 \
                                    is called *not significant*, and one that is not seen differs \
                                    only with p < 0.05.";
 
-/// Explains a table's numbers.
+/// Returns the explanation of the numbers in a table.
 pub(super) fn reading(report: &SuiteReport, ours: &str, paper: &str) -> String {
     let paper = if report.has_paper { paper } else { "" };
     format!("{ours}{paper}.")
 }
 
-/// Written where experiments share runs.
+/// Note for experiments that share runs.
 pub(super) const SHARED: &str = "Experiments that ask for the same settings and seeds share their \
                                  runs, so their results are not independent.";
 
-/// How to make the gallery, where there is none.
+/// Returns the note on creating the gallery, for reports without one.
 pub(super) fn to_look_at(report: &SuiteReport) -> String {
     format!(
         "{} makes a gallery of all runs: final states and replays.",
@@ -32,7 +32,7 @@ pub(super) fn to_look_at(report: &SuiteReport) -> String {
     )
 }
 
-/// The opening sections: damaged and missing runs, and differences.
+/// Creates the opening sections: damaged and missing runs, and differences.
 pub(super) fn opening(report: &SuiteReport) -> Vec<(&'static str, Vec<String>)> {
     let mut opening = Vec::new();
     if !report.damaged.is_empty() {
@@ -99,7 +99,7 @@ pub(super) fn opening(report: &SuiteReport) -> Vec<(&'static str, Vec<String>)> 
     opening
 }
 
-/// Heading of a table.
+/// Returns the heading of a table.
 pub(super) fn heading(table: &Table) -> String {
     if table.source.is_empty() {
         table.title.clone()
