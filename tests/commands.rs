@@ -504,7 +504,7 @@ fn an_exported_genome_has_the_same_bytes_in_c_and_rust() {
         let run = evolver.run(&arguments);
         assert_eq!(run.code, Some(0), "{run:?}");
         let again = evolver.run(&arguments);
-        assert_refused(&again, &[&format!("--out = {name}"), "it exists"]);
+        assert_refused(&again, &[&format!("--out = {name}"), "already exists"]);
     }
     evolver.write(
         "printer.c",

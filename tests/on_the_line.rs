@@ -335,7 +335,12 @@ fn a_silent_port_is_refused() {
         let run = evolver.run(&arguments);
         assert_failed(
             &run,
-            &[&silent.port, "silence for 2.", "115200 baud", "--wait"],
+            &[
+                &silent.port,
+                "nothing received for 2.",
+                "115200 baud",
+                "--wait",
+            ],
         );
     }
 }
@@ -348,7 +353,12 @@ fn another_device_is_refused() {
             let run = evolver.run(&arguments);
             assert_failed(
                 &run,
-                &[&device.port, "another device is talking", words, "--wait"],
+                &[
+                    &device.port,
+                    "a different device is sending data",
+                    words,
+                    "--wait",
+                ],
             );
         }
     };
@@ -371,7 +381,10 @@ fn a_device_that_never_stops_sending_is_refused() {
     let compass = Device::talking(b"$HCHDG,101.1,,,7.1,W*3C\r\n");
     for arguments in all_commands(&compass.port) {
         let run = evolver.run(&arguments);
-        assert_failed(&run, &["another device is talking", "without a message"]);
+        assert_failed(
+            &run,
+            &["a different device is sending data", "without a message"],
+        );
     }
 }
 
@@ -403,7 +416,7 @@ fn a_robot_of_another_kernel_is_refused_before_anything_is_stopped_or_erased() {
     ] {
         let run = evolver.run(arguments);
         let words = format!(
-            "the robot is kernel {}, this program is",
+            "the robot has kernel {}, this program has",
             KernelId(kernel.0)
         );
         assert_failed(&run, &[&words]);
@@ -496,7 +509,7 @@ fn a_line_unplugged_halfway_leaves_the_old_genome_in_use() {
     // Request 1 stops, request 2 begins, the others are chunks; the last one commits.
     for done in 1..=6 {
         for (fault, words) in [
-            (Fault::PulledAfter(done), "the line broke"),
+            (Fault::PulledAfter(done), "the line failed"),
             (Fault::MuteAfter(done), "stopped answering"),
         ] {
             // The longest time-out is that of an erase.
@@ -525,7 +538,7 @@ fn a_line_unplugged_during_monitor_or_hil_is_reported() {
     let evolver = with_genomes();
     let robot = with_the_old_genome(&evolver, Fault::PulledAfter(20));
     let run = evolver.run(&["hil", "old.genome", "--port", &robot.device.port]);
-    assert_failed(&run, &["the line broke while the robot was stepping"]);
+    assert_failed(&run, &["the line failed while the robot was stepping"]);
     let robot = with_the_old_genome(&evolver, Fault::MuteAfter(20));
     let run = evolver.run(&["hil", "old.genome", "--port", &robot.device.port]);
     assert_failed(&run, &["the robot stopped answering while it was stepping"]);
@@ -539,7 +552,7 @@ fn a_line_unplugged_during_monitor_or_hil_is_reported() {
         watching.join().unwrap()
     });
     assert_eq!(run.code, Some(1), "{run:?}");
-    let told = "the line broke while the robot was reporting";
+    let told = "the line failed while the robot was reporting";
     assert!(run.stderr.contains(told), "{run:?}");
 }
 
@@ -673,7 +686,7 @@ fn a_board_that_restarts_when_its_port_is_opened_is_waited_for() {
             assert_eq!(run.code, Some(0), "{run:?}");
         }
         let run = given_up.join().unwrap();
-        assert_failed(&run, &["another device is talking", "--wait 10"]);
+        assert_failed(&run, &["a different device is sending data", "--wait 10"]);
     });
 }
 

@@ -689,7 +689,10 @@ fn genomes_are_read_from_run_directories_and_export_overwrites_no_file() {
     assert_refused(&run, &["run/best.genome", "from a run directory"]);
     evolver.write("there", b"mine");
     let run = evolver.run(&words("export run --format c --out there"));
-    assert_refused(&run, &["--out = there: it exists; name another"]);
+    assert_refused(
+        &run,
+        &["--out = there: already exists; choose a different name"],
+    );
     assert_eq!(evolver.text("there"), "mine");
 }
 

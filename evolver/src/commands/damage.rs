@@ -74,7 +74,7 @@ pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
             let found = classify(grid, &finished.final_poses).map_err(BadInput::new)?;
             *found.names().first().ok_or_else(|| {
                 BadInput::new(format!(
-                    "{}: the swarm formed nothing; name a structure with --structure",
+                    "{}: the swarm formed no structure; choose a structure with --structure",
                     arguments.run.display()
                 ))
             })?

@@ -15,7 +15,7 @@ pub(super) fn refuse_existing(flag: &str, path: &Path, overwrite: bool) -> Resul
 /// Creates the error for a path that exists.
 fn exists(flag: &str, path: &Path, or_else: &str) -> BadInput {
     BadInput::new(format!(
-        "--{flag} = {}: it exists; name another{or_else}",
+        "--{flag} = {}: already exists; choose a different name{or_else}",
         path.display()
     ))
 }

@@ -36,19 +36,19 @@ pub enum Problem {
     },
     /// The name cannot be passed to the serial library.
     #[error(
-        "its name is not UTF-8, and ports with such names cannot be opened; give a symbolic link to \
-         it another name, and use that"
+        "its name is not UTF-8, and such ports cannot be opened; create a symbolic link to it with a \
+         UTF-8 name, and use the link"
     )]
     NotUtf8,
     /// Another program uses the port.
-    #[error("the port is in use by another program; close that first")]
+    #[error("the port is in use by another program; close that program first")]
     InUse,
     /// The operating system cannot open the port.
     #[error("the port cannot be opened: {0}")]
     NotOpened(serialport::Error),
     /// Nothing was received.
     #[error(
-        "silence for {seconds:.1} s; expected a robot that is switched on, at {baud} baud (--baud){reader}{RESTARTS}"
+        "nothing received for {seconds:.1} s; expected a robot that is switched on, at {baud} baud (--baud){reader}{RESTARTS}"
     )]
     Silent {
         /// Time waited, in seconds.
@@ -60,7 +60,7 @@ pub enum Problem {
     },
     /// Bytes were received, but no reply from a robot.
     #[error(
-        "another device is talking: {heard}; expected a robot at {baud} baud (--baud){reader}{RESTARTS}"
+        "a different device is sending data: {heard}; expected a robot at {baud} baud (--baud){reader}{RESTARTS}"
     )]
     OtherDevice {
         /// The received data.
@@ -71,13 +71,15 @@ pub enum Problem {
         reader: OtherReader,
     },
     /// The robot uses different arithmetic.
-    #[error("the robot is kernel {robot}, this program is kernel {KERNEL_ID}; update one of them")]
+    #[error(
+        "the robot has kernel {robot}, this program has kernel {KERNEL_ID}; update one of them"
+    )]
     OtherKernel {
         /// The robot's kernel.
         robot: KernelId,
     },
     /// The line failed, for example because it was unplugged.
-    #[error("the line broke while the robot was {doing}: {error}{}", doing.consequence())]
+    #[error("the line failed while the robot was {doing}: {error}{}", doing.consequence())]
     Broken {
         /// The robot's activity at that time.
         doing: Doing,
@@ -128,7 +130,7 @@ pub enum Problem {
 
 /// The end of a message about a robot that has not answered yet.
 const RESTARTS: &str =
-    "; a board that restarts when its port is opened may need longer, as with --wait 10";
+    "; a board that restarts when its port is opened may need a longer wait, such as --wait 10";
 
 /// Whether another program reads the same port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -143,7 +145,7 @@ impl std::fmt::Display for OtherReader {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Possible => "; another program may be reading the port",
-            Self::Certain => "; another program is reading the port: close that first",
+            Self::Certain => "; another program is reading the port: close that program first",
         })
     }
 }
@@ -224,7 +226,7 @@ pub enum Heard {
 impl std::fmt::Display for Heard {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Echo => write!(f, "it only echoes what it is sent"),
+            Self::Echo => write!(f, "it only echoes the requests"),
             Self::OtherVersion { found } => write!(
                 f,
                 "it uses version {found} of the protocol, this program uses version {}",

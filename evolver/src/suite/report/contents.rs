@@ -154,7 +154,7 @@ impl SuiteReport {
         let in_words = |s: f64| seconds(Duration::from_secs_f64(s));
         (self.time.sittings > 0).then(|| {
             format!(
-                "All runs took {} of computing and {} on the clock, summed over {} sittings of one \
+                "All runs took {} of CPU time and {} of elapsed time, summed over {} sittings of one \
                  run each.",
                 in_words(self.time.cpu_s),
                 in_words(self.time.wall_s),
@@ -314,7 +314,7 @@ fn made_again(gathered: &Gathered, called: &str) -> Vec<Provenance> {
             makings.push(again(
                 name,
                 format!(
-                    "{}: all runs named after the structure ({}), after damage",
+                    "{}: all runs dominated by the structure ({}), after damage",
                     resilient.asked.of, resilient.structure
                 ),
                 plural(resilient.named, "run"),

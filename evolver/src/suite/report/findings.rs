@@ -235,7 +235,7 @@ fn model_b(gathered: &Gathered) -> Option<Finding> {
     let test = fisher(&[named, number], &[group.planned as u32, 0]);
     Some(
         Finding {
-            claim: "Sensor model B on 20 × 20 gives lines and pairs only".into(),
+            claim: "Sensor model B on 20 × 20 gives only lines and pairs".into(),
             detail: others(group, is),
             ours: format!("lines or pairs in {}", of_runs(named, group)),
             test: format!("every run; against the paper {}", test.name),
@@ -264,7 +264,7 @@ fn many_structures(gathered: &Gathered) -> Vec<Finding> {
                 group.counted(),
                 names.into_iter().collect::<Vec<_>>().join(", ")
             ),
-            test: "number of structures that runs are named after".into(),
+            test: "number of dominant structures".into(),
             p: None,
             verdict: match (enough, group.is_complete()) {
                 (true, _) => Verdict::Holds,
@@ -441,7 +441,7 @@ fn horizontal(gathered: &Gathered) -> Option<Finding> {
 fn resilience(resilient: &Resilient) -> Vec<Finding> {
     let of_kind = |kind: &str| {
         let claim = format!(
-            "After {kind} the share in the structure at the end is at least that at the start \
+            "After {kind} the share in the structure at the end is at least the share at the start \
              ({})",
             resilient.structure
         );
@@ -449,10 +449,7 @@ fn resilience(resilient: &Resilient) -> Vec<Finding> {
             return Finding {
                 claim,
                 detail: Detail::None,
-                ours: format!(
-                    "none of {} is named after the structure",
-                    resilient.counted()
-                ),
+                ours: format!("the structure dominates none of {}", resilient.counted()),
                 test: "mean shares".into(),
                 p: None,
                 verdict: Verdict::NotEnoughRuns,
@@ -523,7 +520,7 @@ fn noise(gathered: &Gathered) -> Vec<Finding> {
     let test = fisher(&[dispersed, number], &[sparse.planned as u32, 0]);
     vec![
         Finding {
-            claim: "With 15 % noise 20 × 20 gives dispersion only".into(),
+            claim: "With 15 % noise 20 × 20 gives only dispersion".into(),
             detail: others(sparse, is),
             ours: format!("random dispersion in {}", of_runs(dispersed, sparse)),
             test: format!("every run; against the paper {}", test.name),

@@ -688,13 +688,13 @@ impl Resilient {
     pub(super) fn all_damaged(&self) -> Option<String> {
         let all = &self.overall;
         let damaged = match self.named {
-            1 => "The one run damaged".to_owned(),
-            more => format!("All {more} runs damaged likewise"),
+            1 => "The only run damaged".to_owned(),
+            more => format!("All {more} runs damaged in the same way"),
         };
         (all.areas > 0).then(|| {
             format!(
-                "{damaged}, {}: the share at the end is at least that at the start after removal from \
-                 {} (mean change {:+.1} points) and after repositioning from {} ({:+.1} points)",
+                "{damaged}, {}: the share at the end is at least the share at the start after removal \
+                 from {} (mean change {:+.1} points) and after repositioning from {} ({:+.1} points)",
                 plural(all.areas, "area"),
                 all.removal_holds,
                 100.0 * all.removal_gain,

@@ -39,7 +39,7 @@ pub fn page(report: &SuiteReport) -> String {
         escape(&title)
     );
     if report.has_gallery {
-        page += "<p><a href=\"gallery/index.html\">Look at every run</a>: its final state and its replay.</p>\n";
+        page += "<p><a href=\"gallery/index.html\">All runs</a>: final states and replays.</p>\n";
     } else {
         page += &rendered(&to_look_at(report));
     }

@@ -73,7 +73,10 @@ pub fn text(report: &SuiteReport) -> String {
     }
     text += "\nEvery run with its seed and hash: [runs.csv](runs.csv).\n";
     if report.has_gallery {
-        let _ = writeln!(text, "Every run to look at: [gallery](gallery/index.html).");
+        let _ = writeln!(
+            text,
+            "All runs, with final states and replays: [gallery](gallery/index.html)."
+        );
     } else {
         let _ = writeln!(text, "\n{}", to_look_at(report));
     }

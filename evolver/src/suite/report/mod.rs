@@ -130,7 +130,7 @@ pub fn write(
     files::remove_old_parts(out);
     files::replace(
         &out.join(MARKER),
-        b"A report of evolver; another may replace it.\n",
+        b"A report of evolver; a newer report may replace it.\n",
     )?;
     let mut written = Vec::new();
     for (name, contents) in files {
@@ -333,7 +333,10 @@ mod tests {
             !markdown.contains("paper's"),
             "no number of a paper is shown"
         );
-        assert!(markdown.contains("Percentage of new starts"), "{markdown}");
+        assert!(
+            markdown.contains("New starts by final structure"),
+            "{markdown}"
+        );
         let page = std::fs::read_to_string(&written.html).unwrap();
         assert!(page.contains("<svg") && !page.contains("src="));
 

@@ -211,8 +211,7 @@ fn structure_tables(
             // A section may describe several experiments.
             Some(section) => format!("{}-{experiment}", section.file_name()),
         };
-        let title =
-            format!("{experiment}: percentage of runs by the structure they are named after");
+        let title = format!("{experiment}: runs by dominant structure, %");
         let categories = structure_order(&shared);
         let table = share_table(
             id,
@@ -290,14 +289,14 @@ impl Counted {
                  for each."
             }
             Self::RunsAndGenomes => {
-                "Percent with Wilson's 95 % interval. From new starts a genome counts for what \
-                 more than half of them give, else as diverse."
+                "Percent with Wilson's 95 % interval. A genome from new starts \
+                 counts for the orientation of more than half of the starts, otherwise as diverse."
             }
             Self::TiedStarts => {
-                "Percent of all starts of all genomes; one tied between k structures counts 1/k \
-                 for each. The starts of a genome are not independent, so that there is no \
-                 interval; that of the fitness is the bootstrap 95 % interval of the median of the \
-                 genomes' mean fitnesses."
+                "Percent of all starts of all genomes; a start tied between k structures counts 1/k \
+                 for each. No interval is given, because the starts of a genome are not \
+                 independent; the interval of the fitness is the bootstrap 95 % interval of the \
+                 median of the genomes' mean fitnesses."
             }
         }
     }
@@ -332,7 +331,7 @@ fn share_table(
         columns.push("all together".to_owned());
         if counted == Counted::TiedRuns {
             notes.push(
-                "All together: test of both distributions; there a tied run counts for the \
+                "All together: test of both distributions, in which a tied run counts for the \
                  structure that comes first in the paper's Sec. 2.2."
                     .to_owned(),
             );
@@ -510,12 +509,12 @@ fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table> {
         id: format!("{}-by-structure", source.file_name()),
         source: source.to_string(),
         title: format!(
-            "{}, {}: what the runs of each structure are like",
+            "{}, {}: measures of the runs of each structure",
             group.experiment, group.label
         ),
         notes: vec![
             "Mean, and median in brackets with its bootstrap 95 % interval; sign test against the \
-             paper's median, which cannot tell anything from fewer than six runs."
+             paper's median. With fewer than six runs, a sign test cannot reach p < 0.05."
                 .to_owned(),
         ],
         columns: present.iter().map(|s| s.name().to_owned()).collect(),
@@ -679,8 +678,8 @@ fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) -> Option<T
     let note = if sources.is_empty() {
         "Medians with bootstrap 95 % interval."
     } else {
-        "Medians with bootstrap 95 % interval and sign test against the paper's median, the \
-         printed number being taken as exact to half its last digit; percentages with Wilson's \
+        "Medians with bootstrap 95 % interval and sign test against the paper's median, where the \
+         printed number counts as exact to half its last digit; percentages with Wilson's \
          interval and Fisher's test."
     };
     Some(Table {
@@ -759,8 +758,7 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
                 .any(|s| s.runs.iter().flatten().any(|r| r == c))
     });
     let id = source.map_or("orientations".to_owned(), Source::file_name);
-    let title =
-        "Percentage of runs, and of genomes from new starts, by the way their lines go".to_owned();
+    let title = "Runs, and genomes from new starts, by line orientation, %".to_owned();
     let counted = Counted::RunsAndGenomes;
     let mut table = share_table(id, in_words(source), title, counted, &shared, &categories);
     let done = |reevaluated: &&Reevaluated| !reevaluated.genomes.is_empty();
@@ -775,7 +773,7 @@ fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
             .iter()
             .filter(|names| names.first() != Some(&Structure::Line));
         table.notes.push(format!(
-            "{}: {} of {} new starts ended in something other than lines.",
+            "{}: {} of {} new starts did not end in lines.",
             reevaluated.label,
             other.count(),
             all.len()
@@ -821,7 +819,7 @@ fn new_starts(gathered: &Gathered) -> Option<Table> {
         .collect();
     let categories = structure_order(&shared);
     let id = "new-starts".to_owned();
-    let title = "Percentage of new starts by the structure that they end in".to_owned();
+    let title = "New starts by final structure, %".to_owned();
     let counted = Counted::TiedStarts;
     let mut table = share_table(id, String::new(), title, counted, &shared, &categories);
     table.columns.insert(0, "median fitness".to_owned());
@@ -855,7 +853,7 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
         "similarity",
     ];
     let mut notes = vec![format!(
-        "Named after the structure ({}): {} of {} of {}.",
+        "Dominated by the structure ({}): {} of {} of {}.",
         resilient.structure,
         resilient.named,
         plural(resilient.looked_through, "run"),
@@ -864,10 +862,10 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
     let mut rows = Vec::new();
     if let Some(damaged) = &resilient.damaged {
         let chosen = match resilient.further {
-            0 => "Of these the one with the largest share was damaged".to_owned(),
+            0 => "The run with the largest share was damaged".to_owned(),
             further => format!(
-                "So evolution went on, of all settings in turn, and the first named so, run \
-                 {further} beyond the plan, was damaged"
+                "Therefore further seeds were evolved, of all settings in turn, and the first run with \
+                 the structure, run {further} beyond the plan, was damaged"
             ),
         };
         let grid = damaged.run.finished.settings.scenario().grid();
@@ -880,11 +878,11 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
             let grids = if grid.to_string() == DAMAGED_GRID {
                 String::new()
             } else {
-                format!(" and on a different grid, {grid} instead of {DAMAGED_GRID}")
+                format!(" and evolved on a different grid, {grid} instead of {DAMAGED_GRID}")
             };
             notes.push(format!(
-                "It is another genome than the paper's{grids}, so that the numbers need not be the \
-                 same and are not tested."
+                "The genome is not the paper's{grids}, so the numbers may differ and are not \
+                 tested."
             ));
         }
         notes.extend(resilient.all_damaged().map(|words| words + "."));
@@ -934,7 +932,7 @@ fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {
         }
     } else {
         notes.push(format!(
-            "There is none to damage in {}; more runs are needed.",
+            "No run with the structure was found in {}; more runs are needed.",
             resilient.counted()
         ));
     }

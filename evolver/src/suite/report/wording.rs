@@ -8,11 +8,11 @@ use minimal_surprise_evolution::text::{markdown, markdown_code};
 use std::fmt::Write;
 
 /// Text before the findings.
-pub(super) const VERDICTS: &str = "*Holds* and *differs* say whether the statement, as worded, is \
-                                   true of our runs. The p-value stands beside it and only tells \
-                                   whether a tendency may be chance: one that is seen with p ≥ 0.05 \
-                                   is called *not significant*, and one that is not seen differs \
-                                   only with p < 0.05.";
+pub(super) const VERDICTS: &str = "*Holds* and *differs* state whether the claim, as worded, is \
+                                   true of our runs. The p-value only indicates whether a \
+                                   tendency may be due to chance: a tendency that is present with \
+                                   p ≥ 0.05 is marked *not significant*, and a missing tendency \
+                                   counts as *differs* only with p < 0.05.";
 
 /// Returns the explanation of the numbers in a table.
 pub(super) fn reading(report: &SuiteReport, ours: &str, paper: &str) -> String {
@@ -21,13 +21,13 @@ pub(super) fn reading(report: &SuiteReport, ours: &str, paper: &str) -> String {
 }
 
 /// Note for experiments that share runs.
-pub(super) const SHARED: &str = "Experiments that ask for the same settings and seeds share their \
+pub(super) const SHARED: &str = "Experiments with the same settings and seeds share their \
                                  runs, so their results are not independent.";
 
 /// Returns the note on creating the gallery, for reports without one.
 pub(super) fn to_look_at(report: &SuiteReport) -> String {
     format!(
-        "{} makes a gallery of all runs: final states and replays.",
+        "{} creates a gallery of all runs: final states and replays.",
         markdown_code(&format!("{} report --gallery", report.called))
     )
 }
@@ -38,7 +38,7 @@ pub(super) fn opening(report: &SuiteReport) -> Vec<(&'static str, Vec<String>)> 
     if !report.damaged.is_empty() {
         let runs: Vec<String> = report.damaged.iter().map(|id| markdown_code(id)).collect();
         let line = format!(
-            "Left out of everything below, because they are damaged or unreadable: {}, {}.",
+            "Excluded from this report, because they are damaged or unreadable: {}, {}.",
             plural(runs.len(), "run"),
             runs.join(", ")
         );
@@ -46,7 +46,7 @@ pub(super) fn opening(report: &SuiteReport) -> Vec<(&'static str, Vec<String>)> 
     }
     if !report.missing.is_empty() {
         let mut lines = vec![
-            "Not all runs are finished; everything below is of those that are.".to_owned(),
+            "Not all runs are finished; this report covers only the finished runs.".to_owned(),
             String::new(),
         ];
         lines.extend(report.missing.iter().map(|line| format!("- {line}")));
@@ -67,9 +67,7 @@ pub(super) fn opening(report: &SuiteReport) -> Vec<(&'static str, Vec<String>)> 
             lines.push(line);
         }
         if lines.is_empty() {
-            lines.push(
-                "No main finding of the paper that these runs can tell about differs.".into(),
-            );
+            lines.push("No main finding of the paper that these runs can test differs.".into());
         } else {
             lines.insert(
                 0,
@@ -78,9 +76,9 @@ pub(super) fn opening(report: &SuiteReport) -> Vec<(&'static str, Vec<String>)> 
         }
         lines.push(String::new());
         lines.push(format!(
-            "Of {} of our numbers against the paper's, {} p < {}; by chance alone at most about \
-             {:.0} would. Sign tests with fewer than {} runs cannot reach that and are left out; a \
-             value in two tables counts once.\n",
+            "Of {} of our numbers against the paper's, {} p < {}; at most about {:.0} would be \
+             expected by chance. Sign tests with fewer than {} runs cannot reach this and are left \
+             out; a value in two tables counts once.\n",
             plural(report.tests, "test"),
             match report.differences.len() {
                 1 => "1 has".to_owned(),
@@ -91,7 +89,7 @@ pub(super) fn opening(report: &SuiteReport) -> Vec<(&'static str, Vec<String>)> 
             RUNS_MIN
         ));
         lines.extend(report.differences.iter().map(|line| format!("- {line}")));
-        opening.push(("Where we differ", lines));
+        opening.push(("Differences from the paper", lines));
     }
     if !report.looked_into.is_empty() {
         opening.push(("Notes on the differences", report.looked_into.clone()));
