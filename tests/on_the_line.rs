@@ -634,7 +634,7 @@ fn every_command_ends_although_another_program_reads_the_port() {
         if run.code != Some(0) {
             assert_failed(&run, &[&port]);
             let error = run.stderr.lines().last().unwrap_or_default();
-            let told = ["another program", "another device"];
+            let told = ["another program", "a different device"];
             assert!(told.iter().any(|told| error.contains(told)), "{run:?}");
             assert!(!error.contains("in use"), "{run:?}");
         }

@@ -709,7 +709,7 @@ fn all_damaged_runs_are_named_and_the_others_are_done_shown_and_reported() {
             );
         }
         let again = format!(
-            "delete {}, then: evolver suite own.toml run",
+            "delete {}, then run: evolver suite own.toml run",
             runs[..4].join(" ")
         );
         let mut sorted = runs[..4].to_vec();
@@ -764,7 +764,7 @@ fn a_run_with_a_damaged_checkpoint_is_named_and_the_others_are_done() {
         assert!(run.stdout.contains(shown), "{run:?}");
         let of_it = |line: &str| line.contains(runs[0]) && line.contains("checkpoint is damaged");
         assert!(run.stderr.lines().any(of_it), "{run:?}");
-        let again = format!("delete suite/runs/{}, then: ", runs[0]);
+        let again = format!("delete suite/runs/{}, then run: ", runs[0]);
         assert!(run.stderr.contains(&again), "{run:?}");
     }
     fs::remove_dir_all(runs_of_suite.join(runs[0])).unwrap();

@@ -1,8 +1,10 @@
-//! All output to standard output and standard error. The reader may close the pipe, and the disk
-//! may be full. Writing a report to a closed pipe is not an error, as in `evolver classify RUN |
-//! head`. Long work stops at a point from which it can be resumed ([`event`]). Failures to write to
-//! standard error are ignored. Files and pipes receive UTF-8; a terminal receives ASCII if its
-//! locale does not support UTF-8.
+//! All output to standard output and standard error.
+//!
+//! The reader may close the pipe, and the disk may be full. Writing a report to a closed pipe is
+//! not an error, as in `evolver classify RUN | head`. Long work stops at a point from which it can
+//! be resumed ([`event`]). Failures to write to standard error are ignored.
+//!
+//! Files and pipes receive UTF-8; a terminal receives ASCII if its locale does not support UTF-8.
 
 use crate::exit::Exit;
 use crate::signals;

@@ -1,7 +1,8 @@
-//! Benchmarks, reported as speed ratios within one run. All speeds are measured on early, middle
-//! and late populations of real evolutions ([`populations`]), in robot-steps per CPU-second on one
-//! thread. The baseline is a straightforward floating-point program of the same model
-//! ([`f32_program`]).
+//! Benchmarks, reported as speed ratios within one run.
+//!
+//! All speeds are measured on early, middle and late populations of real evolutions
+//! ([`populations`]), in robot-steps per CPU-second on one thread. The baseline is a
+//! straightforward floating-point program of the same model ([`f32_program`]).
 
 pub mod f32_program;
 pub mod populations;

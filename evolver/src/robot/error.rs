@@ -12,7 +12,7 @@ pub struct RobotError {
     pub port: PortName,
     /// The problem.
     pub problem: Problem,
-    /// The robot's state and what to do about it, if it differs from the state before the command.
+    /// The robot's state and advice for the user, if the command has changed the state.
     pub left: Option<String>,
 }
 

@@ -1,8 +1,9 @@
-//! Checks that the values reported by a robot are possible, before they are used. Some values are
-//! not checked, since nothing is computed from them: the write count in the reply to a commit,
-//! after which the robot is asked for the genome in use; the counters of the line, which can have
-//! any value and are shown unchanged; and the expected offset in the rejection of a chunk, which is
-//! shown in the message.
+//! Checks that the values reported by a robot are possible, before they are used.
+//!
+//! Some values are not checked, since nothing is computed from them: the write count in the reply
+//! to a commit, after which the robot is asked for the genome in use; the counters of the line,
+//! which can have any value and are shown unchanged; and the expected offset in the rejection of a
+//! chunk, which is shown in the message.
 
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_controller::{KERNEL_ID, Surprise};

@@ -1,6 +1,7 @@
-//! Experiments of a suite: the table `[[experiment]]`, and its combinations of settings. In
-//! addition to its own keys, the table has a key for every setting that a suite may list, with one
-//! value or several.
+//! Experiments of a suite: the table `[[experiment]]`, and its combinations of settings.
+//!
+//! In addition to its own keys, the table has a key for every setting that a suite may list, with
+//! one value or several.
 
 use minimal_surprise_controller::Prediction;
 use minimal_surprise_evolution::settings::{

@@ -1,10 +1,12 @@
-//! Plans: the runs of a suite, each named by a hash of its inputs. A run's ID is a hash of
-//! everything that the run's result depends on: the kernel, the version of the evolution, and the
-//! resolved settings including the seed. Finished runs are therefore found reliably, and
-//! experiments that include the same run share it. A plan does not store its runs. It stores the
-//! order of the settings, and for each the seeds that no earlier equal settings have. Runs are
-//! created one at a time on request, so that a plan of a million runs, or a share of it, takes no
-//! more memory than a plan of ten.
+//! Plans: the runs of a suite, each named by a hash of its inputs.
+//!
+//! A run's ID is a hash of everything that the run's result depends on: the kernel, the version of
+//! the evolution, and the resolved settings including the seed. Finished runs are therefore found
+//! reliably, and experiments that include the same run share it.
+//!
+//! A plan does not store its runs. It stores the order of the settings, and for each the seeds that
+//! no earlier equal settings have. Runs are created one at a time on request, so that a plan of a
+//! million runs, or a share of it, takes no more memory than a plan of ten.
 
 use super::experiment::ExperimentTable;
 use super::file::{Suite, check_combinations, check_seeds};
@@ -228,7 +230,7 @@ pub enum PlanError {
     Experiment {
         /// The experiment.
         experiment: String,
-        /// What is wrong and what would be valid.
+        /// The problem and the valid values.
         problem: String,
     },
     /// A setting is not valid.

@@ -1,7 +1,9 @@
 //! Searches: evolution of further seeds until a run has the structure that a damage experiment
-//! needs. The planned runs of the experiment come first. If the structure dominates none of them,
-//! further seeds are run, of all settings in turn, until it dominates a run. The number of that run
-//! in this order is the number of runs needed, regardless of which processes executed them.
+//! needs.
+//!
+//! The planned runs of the experiment come first. If the structure dominates none of them, further
+//! seeds are run, of all settings in turn, until it dominates a run. The number of that run in this
+//! order is the number of runs needed, regardless of which processes executed them.
 
 use super::file::Resilience;
 use super::plan::{Plan, PlannedRun};

@@ -1,5 +1,7 @@
-//! Slurm: a job array whose tasks are shares of a suite's runs. Tasks do not communicate; a task
-//! that is requeued or runs twice determines from the files which runs are done.
+//! Slurm: a job array whose tasks are shares of a suite's runs.
+//!
+//! Tasks do not communicate; a task that is requeued or runs twice determines from the files which
+//! runs are done.
 
 use super::cluster::{Job, SCRIPT};
 use minimal_surprise_evolution::files::FileError;

@@ -1,6 +1,8 @@
-//! Work: execution of a single run of a plan. The state of a run is determined only by files: a run
-//! is done if its directory contains `DONE` and all other files of a completed run. Any number of
-//! processes may work on the same plan; each takes only runs that no other process has locked.
+//! Work: execution of a single run of a plan.
+//!
+//! The state of a run is determined only by files: a run is done if its directory contains `DONE`
+//! and all other files of a completed run. Any number of processes may work on the same plan; each
+//! takes only runs that no other process has locked.
 
 use super::plan::{Plan, PlannedRun, Runs};
 use crate::program::this_program;

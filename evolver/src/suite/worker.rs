@@ -147,7 +147,7 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Executes a run; returns `None` if an error concerns only this run, and adds it to the
+    /// Executes a run; returns `None` if an error affects only this run, which is then added to the
     /// damaged runs.
     fn work_on(
         &mut self,
@@ -191,7 +191,7 @@ impl<'a> Worker<'a> {
     /// Executes the runs to be done, and waits for runs that other processes execute.
     ///
     /// # Errors
-    /// [`RunDirError`] if an error does not concern only a single run.
+    /// [`RunDirError`] if an error affects more than a single run.
     pub fn do_all(
         &mut self,
         runs: Runs<'_>,
@@ -228,7 +228,7 @@ impl<'a> Worker<'a> {
     /// Evolves further seeds until a run has the structure that a damage experiment needs.
     ///
     /// # Errors
-    /// [`RunDirError`] if an error does not concern only a single run.
+    /// [`RunDirError`] if an error affects more than a single run.
     pub fn search(&mut self, asked: &Resilience, watch: &dyn Watch) -> Result<Ended, RunDirError> {
         let (mut after, mut begun) = (0, 0);
         let mut waiting = Waiting::new();

@@ -1,7 +1,9 @@
 //! The report of a suite: its tables, figures and findings compared with the paper's, with
-//! intervals and tests. [`gather`] reads the finished runs and executes re-evaluations and damage
-//! experiments; [`tables`], [`figures`] and [`findings`] evaluate them with the numbers of
-//! [`paper`]; [`contents`] combines the results, which [`mod@markdown`] and [`html`] write.
+//! intervals and tests.
+//!
+//! [`gather`] reads the finished runs and executes re-evaluations and damage experiments;
+//! [`tables`], [`figures`] and [`findings`] evaluate them with the numbers of [`paper`];
+//! [`contents`] combines the results, which [`mod@markdown`] and [`html`] write.
 
 pub mod contents;
 pub mod damage_areas;

@@ -1,5 +1,6 @@
-//! Statistical intervals and tests. All random draws use a fixed seed, so that the same runs give
-//! the same report.
+//! Statistical intervals and tests.
+//!
+//! All random draws use a fixed seed, so that the same runs give the same report.
 
 use minimal_surprise_evolution::reevaluation::median;
 use minimal_surprise_sim::seed::uniform_below;
