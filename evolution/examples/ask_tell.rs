@@ -1,4 +1,5 @@
-//! Another optimiser: CMA-ES of the crate `cmaes` proposes the weights, and is told their fitness.
+//! A custom optimiser: CMA-ES from the crate `cmaes` proposes the weights and receives their
+//! fitness.
 //!
 //! `cargo run --release -p minimal-surprise-evolution --example ask_tell`
 
@@ -7,7 +8,7 @@ use minimal_surprise_controller::{Genome, Topology};
 use minimal_surprise_evolution::settings::Settings;
 use minimal_surprise_sim::{Engine, EnginePath, Evaluator, SeedTree, Trial, TrialSet};
 
-/// Q3.12 of a real number, within the range of weights.
+/// Converts a real number to Q3.12, limited to the range of weights.
 fn weight_q3_12(weight: f64) -> i16 {
     (weight * 4096.0).round().clamp(-32767.0, 32767.0) as i16
 }

@@ -1,7 +1,7 @@
-//! An analysis of your own: how the robots' headings agree over the steps of a finished run.
+//! A custom analysis: the agreement of the robots' headings over the steps of a finished run.
 //!
-//! `cargo run --release -p minimal-surprise-evolution --example own_analysis -- RUN`, where `RUN` is
-//! a run directory; without one, a short evolution is made.
+//! `cargo run --release -p minimal-surprise-evolution --example own_analysis -- RUN`, where `RUN`
+//! is a run directory; without it, the example makes a short run.
 
 use minimal_surprise_evolution::evolving::until_finished;
 use minimal_surprise_evolution::experiment::Experiment;
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         if step % 50 == 0 {
             let share = most as f64 / world.poses().len() as f64;
             println!(
-                "step {step}: {:.0} % of the robots have one heading",
+                "step {step}: {:.0} % of the robots have the same heading",
                 100.0 * share
             );
         }
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A run made here.
+/// Makes a short run in `folder`.
 fn evolved(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
     let settings = Settings::builder()
         .population(8)

@@ -1,4 +1,4 @@
-//! A fitness of your own: swarms are selected for robots that keep moving.
+//! A custom fitness function: swarms are selected for robots that keep moving.
 //!
 //! `cargo run --release -p minimal-surprise-evolution --example own_fitness`
 
@@ -7,7 +7,7 @@ use minimal_surprise_evolution::population::Population;
 use minimal_surprise_evolution::settings::Settings;
 use minimal_surprise_sim::{Pose, SeedTree, Trial, World};
 
-/// Steps forward, of all robots together.
+/// Number of forward steps of all robots together.
 #[derive(Default)]
 struct Moves {
     before: Vec<Pose>,

@@ -1,4 +1,4 @@
-//! A selection of your own: parents are drawn from the better half, each as likely as the others.
+//! A custom selection: parents are drawn from the better half with equal probability.
 //!
 //! `cargo run --release -p minimal-surprise-evolution --example own_selection`
 
@@ -9,7 +9,7 @@ use minimal_surprise_evolution::settings::Settings;
 use minimal_surprise_sim::seed::{Stream, uniform_below};
 use minimal_surprise_sim::{SeedTree, Trial};
 
-/// Slots of the better half.
+/// Slots of the better half of the genomes.
 struct Truncation(Vec<usize>);
 
 impl Truncation {

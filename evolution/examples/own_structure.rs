@@ -1,4 +1,4 @@
-//! A structure of your own: two-by-two blocks of robots, in the final states of short evolutions.
+//! A custom structure: two-by-two blocks of robots, in the final states of short evolutions.
 //!
 //! `cargo run --release -p minimal-surprise-evolution --example own_structure`
 
@@ -10,14 +10,14 @@ use minimal_surprise_sim::{Engine, EnginePath, Grid, Pose, WorldError};
 use std::collections::HashSet;
 use std::sync::atomic::AtomicBool;
 
-/// Robots on all four cells of a block.
+/// A two-by-two block; robots belong to it if all four cells are occupied.
 struct Block;
 
 impl Pattern for Block {
     fn members(&self, grid: Grid, poses: &[Pose]) -> Result<Vec<bool>, WorldError> {
         check_poses(grid, poses)?;
         let occupied: HashSet<(u16, u16)> = poses.iter().map(|pose| (pose.x, pose.y)).collect();
-        // The cell at this offset, around the torus.
+        // Checks the cell at this offset from a pose, around the torus.
         let is_occupied = |pose: &Pose, columns: i32, rows: i32| {
             let x = (i32::from(pose.x) + columns).rem_euclid(grid.width().into());
             let y = (i32::from(pose.y) + rows).rem_euclid(grid.height().into());

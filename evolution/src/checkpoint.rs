@@ -1,7 +1,7 @@
-//! Checkpoints: an evolution between two generations, in one file.
+//! Checkpoints: the state of an evolution between two generations, in one file.
 //!
-//! postcard, then its CRC-32C in four bytes, little-endian. It holds the text of the run's
-//! `config.toml`, so that a run is never continued with other settings.
+//! The file holds postcard data and its CRC-32C in four bytes, little-endian. The data includes the
+//! text of the run's `config.toml`, so that a run is never resumed with different settings.
 
 use crate::experiment::{Experiment, GenerationRecord};
 use crate::population::Population;
@@ -14,27 +14,27 @@ use serde::{Deserialize, Serialize};
 /// Version of the file's layout.
 const SCHEMA: u32 = 1;
 
-/// The bytes are not a checkpoint that can be continued from.
+/// Error: the bytes are not a checkpoint that can be resumed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
-    /// The file was cut or changed.
+    /// The file was truncated or changed.
     #[error("the checkpoint is damaged: {0}")]
     Damaged(&'static str),
-    /// Written by a program with a different layout.
+    /// The checkpoint was written by a program with a different layout.
     #[error("the checkpoint has schema version {found}; this program reads version {SCHEMA}")]
     OtherSchema {
         /// The version found.
         found: u32,
     },
-    /// Written by a program with another arithmetic.
+    /// The checkpoint was written by a program with a different kernel.
     #[error("the checkpoint belongs to kernel {found}; this program is kernel {KERNEL_ID}")]
     OtherKernel {
         /// The kernel found.
         found: KernelId,
     },
     /// The run's settings were edited.
-    #[error("config.toml is not what the run was started with")]
+    #[error("config.toml differs from the settings that the run was started with")]
     OtherSettings,
 }
 
@@ -75,10 +75,11 @@ fn sealed(stored: &Stored) -> Vec<u8> {
     bytes
 }
 
-/// The experiment in a checkpoint.
+/// Decodes a checkpoint.
 ///
 /// # Errors
-/// [`CheckpointError`] if it is damaged or belongs to another program or other settings.
+/// [`CheckpointError`] if the checkpoint is damaged or belongs to a different program or to
+/// different settings.
 pub fn decode(
     bytes: &[u8],
     settings: Settings,
@@ -89,7 +90,7 @@ pub fn decode(
     if CRC_32C.checksum(body) != u32::from_le_bytes(*crc) {
         return Err(Damaged("its checksum does not match"));
     }
-    // The version comes first, so that it can be read whatever follows.
+    // The version comes first, so that it can be read whatever the rest of the layout is.
     let (found, _) = postcard::take_from_bytes(body).map_err(|_| Damaged("no version"))?;
     if found != SCHEMA {
         return Err(CheckpointError::OtherSchema { found });
@@ -124,7 +125,7 @@ pub fn decode(
     ))
 }
 
-/// Checks that the numbers are possible for an evolution with these settings.
+/// Checks that the values are possible for an evolution with these settings.
 fn check(stored: &Stored, settings: &Settings) -> Result<(), &'static str> {
     let (done, all) = (
         stored.history.len() as u64,
@@ -133,9 +134,9 @@ fn check(stored: &Stored, settings: &Settings) -> Result<(), &'static str> {
     if done > all || stored.best.is_some() != (done > 0) {
         return Err("it has a different number of generations from config.toml");
     }
-    // The last generation is not followed by another population.
+    // No population follows the last generation.
     if u64::from(stored.generation) != done.min(all - 1) {
-        return Err("its population is of another generation");
+        return Err("its population belongs to a different generation");
     }
     let bits = settings.scored_bits();
     let is_possible = |(expected, record): (u32, &GenerationRecord)| {
@@ -147,7 +148,7 @@ fn check(stored: &Stored, settings: &Settings) -> Result<(), &'static str> {
             && record.total_matches <= bits.saturating_mul(settings.population().into())
     };
     if !(0..).zip(&stored.history).all(is_possible) {
-        return Err("a generation has numbers that cannot be");
+        return Err("a generation has impossible values");
     }
     Ok(())
 }
@@ -179,7 +180,7 @@ mod tests {
         Settings::resolve(&given, || 1).unwrap()
     }
 
-    /// What becomes of a checkpoint after two of three generations, changed with a correct checksum.
+    /// Decodes a changed checkpoint with a correct checksum, taken after two of three generations.
     fn decoded(change: impl FnOnce(&mut Stored)) -> Result<Experiment, CheckpointError> {
         let mut experiment = Experiment::new(settings());
         for _ in 0..2 {

@@ -1,22 +1,22 @@
-//! Damaged runs of a suite or a gallery: they are named together at the end, and the others are done,
-//! shown and reported.
+//! Damaged runs of a suite or a gallery. They are listed together at the end, after all other runs
+//! have been processed.
 
 use crate::finished_run::{FinishedRun, ReadRunError};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// What is wrong with runs, by their directories.
+/// Descriptions of what is wrong with runs, by run directory.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DamagedRuns(BTreeMap<PathBuf, String>);
 
 impl DamagedRuns {
-    /// Reads a run; none if it is not complete, or damaged, which is then known here.
+    /// Reads a run; returns `None` if it is incomplete or damaged. A damaged run is added.
     pub fn read(&mut self, run: &Path) -> Option<FinishedRun> {
         self.take(run, FinishedRun::read_if_complete(run)).flatten()
     }
 
-    /// Returns what was read of a run; if reading failed, adds the run.
+    /// Returns the result of reading a run; if reading failed, adds the run.
     pub fn take<T>(&mut self, run: &Path, read: Result<T, ReadRunError>) -> Option<T> {
         read.map_err(|error| self.add(run, error.cause())).ok()
     }
@@ -31,20 +31,20 @@ impl DamagedRuns {
         self.0.extend(other.0);
     }
 
-    /// Returns whether a run is among them.
+    /// Checks whether a run is damaged.
     #[must_use]
     pub fn contains(&self, run: &Path) -> bool {
         self.0.contains_key(run)
     }
 
-    /// The directories, and what is wrong.
+    /// Returns the run directories and what is wrong with each.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (&Path, &str)> {
         self.0
             .iter()
             .map(|(path, error)| (path.as_path(), error.as_str()))
     }
 
-    /// Returns whether there is none.
+    /// Returns true if no run is damaged.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()

@@ -1,4 +1,4 @@
-//! Evolving with a checkpoint after every generation, written while the next one is evaluated.
+//! Evolution with a checkpoint after every generation, written while the next one is evaluated.
 
 use crate::experiment::{Experiment, GenerationRecord};
 use crate::files::FileError;
@@ -7,11 +7,11 @@ use minimal_surprise_sim::{Engine, EnginePath};
 use std::sync::atomic::AtomicBool;
 use std::thread::{self, ScopedJoinHandle};
 
-/// Evaluates the generations that are left, saving each; false if it was asked to stop before the
-/// last one. When this returns, everything evaluated is saved.
+/// Evaluates and saves all remaining generations; returns false if `stop` was set before the last
+/// one. When this returns, everything evaluated is saved.
 ///
 /// # Errors
-/// [`FileError`] if a generation cannot be saved; the last checkpoint is then still there.
+/// [`FileError`] if a generation cannot be saved; the last checkpoint is kept.
 pub fn until_finished(
     experiment: &mut Experiment,
     run: &RunDir,

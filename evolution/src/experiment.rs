@@ -1,4 +1,4 @@
-//! An experiment: evolution and world together, a generation at a time.
+//! Experiments: evolution and world together, one generation at a time.
 
 use crate::generation_work::GenerationWork;
 use crate::population::{Population, best_slot};
@@ -27,7 +27,7 @@ pub struct GenerationRecord {
     pub worst_matches: u64,
     /// Slot of the best genome.
     pub best_slot: u32,
-    /// The repetition that gave the best genome its fitness, its worst one.
+    /// The repetition that determined the best genome's fitness, its worst one.
     pub worst_repetition: u32,
     /// Robot movement M in that repetition (paper, Eq. 4).
     #[serde(deserialize_with = "ranges::fraction")]
@@ -35,9 +35,9 @@ pub struct GenerationRecord {
     /// Intended robot movement I in that repetition (paper, Eq. 5).
     #[serde(deserialize_with = "ranges::fraction")]
     pub intended_movement: f64,
-    /// Structures that the repetition's final state is named after, `;` between them.
+    /// Structures that dominate the repetition's final state, separated by `;`.
     pub structure: String,
-    /// Share of robots in that structure, 0 to 1.
+    /// Share of robots in each of these structures, 0 to 1.
     #[serde(deserialize_with = "ranges::fraction")]
     pub share: f64,
 }
@@ -53,13 +53,13 @@ pub struct Experiment {
     best: Option<Genome>,
 }
 
-/// What an evolution results in: the last generation's best genome, run once more from where it
-/// had its fitness.
+/// The result of an evolution: the last generation's best genome, run once more from the start that
+/// determined its fitness.
 #[derive(Clone, Debug)]
 pub struct EvolutionResult {
     /// The genome.
     pub genome: Genome,
-    /// Where it comes from.
+    /// Provenance of the genome.
     pub provenance: Provenance,
     /// The repetition whose start was used.
     pub repetition: u32,
@@ -67,32 +67,32 @@ pub struct EvolutionResult {
     pub starts: Vec<Pose>,
     /// The outcome of the run.
     pub outcome: Outcome,
-    /// How it went.
+    /// Measures of the run.
     pub measures: Measures,
-    /// The hash of its steps.
+    /// Hash of the run's steps.
     pub steps_hash: StepsHash,
-    /// What the swarm formed.
+    /// Structures formed by the swarm.
     pub structures: Structures,
     /// The run's hash.
     pub hash: RunHash,
 }
 
 impl EvolutionResult {
-    /// Share of robots in the structure that the run is named after, 0 to 1.
+    /// Returns the share of robots in the run's dominant structure, 0 to 1.
     #[must_use]
     pub fn share(&self) -> f64 {
         share_of_named(&self.structures)
     }
 }
 
-/// Share of robots in the structure that a state is named after; 0 if there is none.
+/// Returns the share of robots in the dominant structure of a state; 0 if the state has none.
 fn share_of_named(found: &Structures) -> f64 {
     let names = found.names();
     names.first().map_or(0.0, |&name| found.share(name))
 }
 
 impl Experiment {
-    /// An evolution before its first generation.
+    /// Creates an evolution before its first generation.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         let seeds = SeedTree::new(settings.seed());
@@ -112,7 +112,7 @@ impl Experiment {
         }
     }
 
-    /// An evolution stored earlier.
+    /// Restores a stored evolution.
     #[must_use]
     pub fn restored(
         settings: Settings,
@@ -130,10 +130,10 @@ impl Experiment {
         }
     }
 
-    /// Evaluates a generation, in parallel, and moves on to the next. Results do not depend on the
+    /// Evaluates a generation, in parallel, and advances to the next. Results do not depend on the
     /// number of threads, the engine or its path.
     ///
-    /// Nothing comes back, and nothing has changed, if `stop` was set on the way.
+    /// Returns `None`, with nothing changed, if `stop` was set during the evaluation.
     pub fn advance(
         &mut self,
         engine: Engine,
@@ -192,10 +192,10 @@ impl Experiment {
         self.history.len() as u64 >= u64::from(self.settings.generations())
     }
 
-    /// The result so far: of the last generation evaluated; none before the first.
+    /// Returns the result of the last generation evaluated; `None` before the first.
     ///
     /// # Errors
-    /// [`WorldError`] if the trial does not fit its own grid.
+    /// [`WorldError`] if the trial does not fit its grid.
     pub fn result(&self) -> Result<Option<EvolutionResult>, WorldError> {
         let (Some(record), Some(genome)) = (self.history.last(), &self.best) else {
             return Ok(None);
@@ -229,31 +229,31 @@ impl Experiment {
         }))
     }
 
-    /// The settings.
+    /// Returns the settings.
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// The generation to evaluate next.
+    /// Returns the generation to evaluate next.
     #[must_use]
     pub fn population(&self) -> &Population {
         &self.population
     }
 
-    /// The generations evaluated, in order.
+    /// Returns the evaluated generations, in order.
     #[must_use]
     pub fn history(&self) -> &[GenerationRecord] {
         &self.history
     }
 
-    /// The hash of the generations evaluated.
+    /// Returns the hash of the evaluated generations.
     #[must_use]
     pub fn hash(&self) -> RunHash {
         self.hash
     }
 
-    /// Best genome of the last generation evaluated.
+    /// Returns the best genome of the last generation evaluated.
     #[must_use]
     pub fn best(&self) -> Option<&Genome> {
         self.best.as_ref()

@@ -1,4 +1,4 @@
-//! Reading a complete run directory back: the genome, where it started from, where it ended.
+//! Reading of complete run directories: the genome, its start and its final state.
 
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::genome_file::{GenomeFile, GenomeFileError};
@@ -19,24 +19,24 @@ use minimal_surprise_sim::{Grid, Pose, SeedTree, Trace, Trial, World, WorldError
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// A run that is complete.
+/// A complete run.
 #[derive(Clone, Debug)]
 pub struct FinishedRun {
-    /// Its settings.
+    /// Settings of the run.
     pub settings: Settings,
-    /// Its result: the last generation's best genome.
+    /// The last generation's best genome.
     pub genome: Genome,
-    /// Where the genome comes from.
+    /// Provenance of the genome.
     pub provenance: Provenance,
-    /// The repetition that gave the genome its fitness.
+    /// The repetition that determined the genome's fitness.
     pub repetition: u32,
-    /// Where the swarm started from in that repetition.
+    /// Starting poses of the swarm in that repetition.
     pub starts: Vec<Pose>,
-    /// Where it ended.
+    /// Final poses of the swarm.
     pub final_poses: Vec<Pose>,
     /// The run's hash.
     pub hash: String,
-    /// The hash of its steps; a run of an older program has none.
+    /// The hash of the run's steps; `None` for a run of an older program.
     pub steps_hash: Option<RecordedHash>,
     /// Best fitness of every generation.
     pub best_fitness: Vec<f64>,
@@ -48,17 +48,17 @@ pub struct FinishedRun {
     pub temperature: Vec<f64>,
     /// Average prediction of every sensor.
     pub average_prediction: Vec<f64>,
-    /// Program, version and revision that did it.
+    /// Name, version and revision of the program that made the run.
     pub program: String,
-    /// How long it took.
+    /// Time that the run took.
     pub time: TimeSpent,
 }
 
-/// A run directory cannot be read back.
+/// Error: a run directory cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadRunError {
-    /// The run has not ended, or there is none.
+    /// The run is incomplete or does not exist.
     #[error("{} holds no complete run: it has no {missing}", path.display())]
     NotComplete {
         /// The directory.
@@ -66,39 +66,39 @@ pub enum ReadRunError {
         /// The file that is missing.
         missing: &'static str,
     },
-    /// The run is marked complete, and is not.
+    /// The run is marked complete, but is not.
     #[error(
         "{error}\nthe run is marked complete, so it was damaged, or made by a different version: \
-         delete {}, and the command that made it does it again",
+         delete {} and repeat the command that made it",
         path.display()
     )]
     Damaged {
         /// The directory.
         path: PathBuf,
-        /// What is wrong.
+        /// The error.
         error: Box<ReadRunError>,
     },
-    /// There is no such directory, or it cannot be entered.
+    /// The directory does not exist or cannot be entered.
     #[error(transparent)]
     NotThere(FileError),
     /// A file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The settings are wrong.
+    /// The settings are invalid.
     #[error(transparent)]
     Settings(#[from] SettingError),
-    /// The genome is not one this program runs.
+    /// The genome file is not valid for this program.
     #[error(transparent)]
     Genome(#[from] GenomeFileError),
-    /// A final state is not one.
+    /// The final state is invalid.
     #[error(transparent)]
     State(#[from] StateError),
-    /// A file is not the JSON that it should be.
+    /// A file does not contain the expected JSON.
     #[error("{}: {error}", path.display())]
     Json {
         /// The file.
         path: PathBuf,
-        /// What is wrong, with line and column.
+        /// The error, with line and column.
         error: serde_json::Error,
     },
     /// The generation table is malformed.
@@ -106,10 +106,10 @@ pub enum ReadRunError {
     Generations {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and where.
+        /// The error and its position.
         error: csv::Error,
     },
-    /// A value in a file cannot be.
+    /// A value in a file is impossible.
     #[error("{}: {problem}", path.display())]
     Value {
         /// The file.
@@ -122,24 +122,24 @@ pub enum ReadRunError {
     Inconsistent {
         /// The directory.
         path: PathBuf,
-        /// What does not fit.
+        /// The inconsistency.
         problem: &'static str,
     },
 }
 
-/// A file holds no final state.
+/// Error: a file holds no valid final state.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StateError {
-    /// It is not the JSON that it should be.
+    /// The file does not contain the expected JSON.
     #[error("{}: {error}", path.display())]
     Json {
         /// The file.
         path: PathBuf,
-        /// What is wrong, with line and column.
+        /// The error, with line and column.
         error: serde_json::Error,
     },
-    /// It has a different layout.
+    /// The file has a different layout.
     #[error("{}: schema version {found}; this program reads version {}", path.display(), SCHEMA_VERSION)]
     OtherSchema {
         /// The file.
@@ -147,24 +147,24 @@ pub enum StateError {
         /// The version found.
         found: u32,
     },
-    /// The grid is not one.
+    /// The grid is invalid.
     #[error("{}: grid = {value}: {problem}", path.display())]
     Grid {
         /// The file.
         path: PathBuf,
         /// The value.
         value: String,
-        /// What is wrong and what would be valid.
+        /// Description of the problem and of valid values.
         problem: String,
     },
-    /// Robots have appeared or vanished.
+    /// The numbers of starting and final poses differ.
     #[error("{}: {found} final poses of {start} robots that started", path.display())]
     Count {
         /// The file.
         path: PathBuf,
-        /// Starting poses.
+        /// Number of starting poses.
         start: usize,
-        /// Final poses.
+        /// Number of final poses.
         found: usize,
     },
     /// The robots do not fit the grid.
@@ -172,13 +172,13 @@ pub enum StateError {
     Poses {
         /// The file.
         path: PathBuf,
-        /// Which robot.
+        /// The error, which names the robots.
         error: WorldError,
     },
 }
 
 impl ReadRunError {
-    /// Returns what is wrong, without what to do about it.
+    /// Returns the error without advice on what to do.
     #[must_use]
     pub fn cause(&self) -> &Self {
         match self {
@@ -188,20 +188,20 @@ impl ReadRunError {
     }
 }
 
-/// What is read of a `final.json`.
+/// The part of a `final.json` that is read.
 #[derive(Clone, Debug)]
 pub struct FinalState {
     /// The grid.
     pub grid: Grid,
-    /// Where the swarm started from.
+    /// Starting poses of the swarm.
     pub starts: Vec<Pose>,
-    /// Where it ended.
+    /// Final poses of the swarm.
     pub final_poses: Vec<Pose>,
     /// The repetition whose start was used.
     pub repetition: u32,
     /// The run's hash.
     pub hash: String,
-    /// The hash of the steps in between, if the file has it.
+    /// The hash of the steps in between, if the file contains one.
     pub steps_hash: Option<RecordedHash>,
     /// Movement M.
     pub movement: f64,
@@ -236,7 +236,7 @@ fn check_version(path: &Path, bytes: &[u8]) -> Result<(), StateError> {
 /// Reads a `final.json`.
 ///
 /// # Errors
-/// [`StateError`] names the file and the place.
+/// [`StateError`] if the contents are invalid; the message names the file and the position.
 pub fn parse_final_state(path: &Path, bytes: &[u8]) -> Result<FinalState, StateError> {
     let json = |error| StateError::Json {
         path: path.to_owned(),
@@ -298,10 +298,10 @@ fn best_fitness(path: &Path, most: u64) -> Result<Vec<f64>, ReadRunError> {
     Ok(values)
 }
 
-/// A file of a run directory is there and can be read to an end.
+/// Checks that a file of a run directory exists and can be read to its end.
 ///
 /// # Errors
-/// [`ReadRunError`] if it is missing, or is a pipe or a device.
+/// [`ReadRunError`] if the file is missing, or is a pipe or a device.
 pub fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
     let path = run.join(file);
     if files::exists(&path)? {
@@ -309,11 +309,11 @@ pub fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
         if kind.is_file() || kind.is_dir() {
             return Ok(());
         }
-        // A pipe would be waited for, and a device may have no end.
+        // Reading a pipe could block, and a device may have no end.
         let error = std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a plain file");
         return Err(FileError::at(&path)(error).into());
     }
-    // Of a directory that is not there, no file is missing.
+    // If the directory is missing, report that instead of a missing file.
     std::fs::metadata(run).map_err(|error| ReadRunError::NotThere(FileError::at(run)(error)))?;
     Err(ReadRunError::NotComplete {
         path: run.to_owned(),
@@ -321,15 +321,16 @@ pub fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
     })
 }
 
-/// The settings in a run directory. The first population is past, so the ancestor is not looked for.
+/// Reads the settings in a run directory. The first population already exists, so the ancestor's
+/// file is not needed.
 ///
 /// # Errors
-/// [`ReadRunError`] if one is missing or wrong.
+/// [`ReadRunError`] if a setting is missing or invalid.
 pub fn settings_of_run(run: &Path) -> Result<Settings, ReadRunError> {
     settings_and_text_of_run(run).map(|(settings, _)| settings)
 }
 
-/// The same with their text, its lines ending with `\n` whatever an editor made of them.
+/// Reads the settings in a run directory and their text, with lines ending in `\n`.
 pub(crate) fn settings_and_text_of_run(run: &Path) -> Result<(Settings, String), ReadRunError> {
     require(run, CONFIG)?;
     let config = run.join(CONFIG);
@@ -357,22 +358,22 @@ fn recorded_hash(run: &Path) -> Result<String, ReadRunError> {
         .map_err(|problem| ReadRunError::Value { path, problem })
 }
 
-/// How far a run is.
+/// State of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// Nothing is there.
+    /// The run does not exist.
     Pending,
-    /// It has begun.
+    /// The run has been started.
     Begun,
-    /// It is complete.
+    /// The run is complete.
     Done,
 }
 
-/// The hash of a run, if it is complete, by a quick look at its directory.
+/// Returns the hash of a run if it is complete, after a quick check of its directory.
 ///
 /// # Errors
-/// [`ReadRunError::Damaged`] if it is marked complete, but a file is missing or has a different
-/// layout, or the completion mark does not contain the hash of the run.
+/// [`ReadRunError::Damaged`] if the run is marked complete, but a file is missing or has a
+/// different layout, or the completion mark does not contain the hash of the run.
 pub fn complete(path: &Path) -> Result<Option<String>, ReadRunError> {
     if !files::exists(&path.join(DONE))? {
         return Ok(None);
@@ -394,12 +395,12 @@ pub fn complete(path: &Path) -> Result<Option<String>, ReadRunError> {
 }
 
 impl FinishedRun {
-    /// Reads a run directory and runs it once more, for all who show or continue what happened: a
-    /// genome or a state that is another run's, or was changed, is found out here.
+    /// Reads a run directory and repeats its final run, to detect a genome or state that was
+    /// changed or belongs to a different run. Commands that show or continue a run use this.
     ///
     /// # Errors
-    /// [`ReadRunError`] if [`read`](Self::read) fails, or the steps or where they end are not what
-    /// the run wrote down.
+    /// [`ReadRunError`] if [`read`](Self::read) fails, or if the repeated steps or final poses
+    /// differ from the recorded ones.
     pub fn read_and_check(path: &Path) -> Result<Self, ReadRunError> {
         let finished = Self::read(path)?;
         let recorded = finished.steps_hash.as_ref();
@@ -422,17 +423,17 @@ impl FinishedRun {
         if other_steps || ends != finished.final_poses {
             return Err(ReadRunError::Inconsistent {
                 path: path.to_owned(),
-                problem: "best.genome does not take the steps that final.json records; one of its \
-                          files is another run's, or was changed",
+                problem: "best.genome does not repeat the steps recorded in final.json; one of the \
+                          files was changed or belongs to another run",
             });
         }
         Ok(finished)
     }
 
-    /// Reads a run directory, if there is one and its run is complete.
+    /// Reads a run directory if it exists and its run is complete.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// Those of [`read`](Self::read).
     pub fn read_if_complete(path: &Path) -> Result<Option<Self>, ReadRunError> {
         if !files::exists(&path.join(DONE))? {
             return Ok(None);
@@ -443,7 +444,7 @@ impl FinishedRun {
     /// Reads a run directory.
     ///
     /// # Errors
-    /// [`ReadRunError`] if the run is not complete, or a file in it is wrong.
+    /// [`ReadRunError`] if the run is not complete, or a file in it is invalid.
     pub fn read(path: &Path) -> Result<Self, ReadRunError> {
         require(path, DONE)?;
         OF_COMPLETE
@@ -468,7 +469,7 @@ impl FinishedRun {
             return inconsistent("final.json has a different grid or swarm size from config.toml");
         }
         if state.repetition >= settings.repetitions() {
-            return inconsistent("final.json is of a repetition that config.toml does not have");
+            return inconsistent("final.json names a repetition beyond those in config.toml");
         }
         if state.temperature.len() != settings.scenario().steps() as usize
             || state.average_prediction.len() != settings.topology().sensors()
@@ -520,7 +521,7 @@ impl FinishedRun {
         })
     }
 
-    /// The trial that the final state came out of: its start and its noise.
+    /// Returns the trial of the final state: its start and its noise.
     #[must_use]
     pub fn trial(&self) -> Trial {
         let seeds = SeedTree::new(self.settings.seed());
@@ -535,7 +536,7 @@ impl FinishedRun {
         }
     }
 
-    /// Runs the genome once more from its start, showing every step.
+    /// Repeats the run of the genome from its start and passes every step to `observe`.
     ///
     /// # Errors
     /// [`WorldError`] if the starting poses do not fit the grid.
@@ -550,7 +551,7 @@ impl FinishedRun {
         .map(|_| ())
     }
 
-    /// The measures of the run.
+    /// Computes the measures of the run.
     ///
     /// # Errors
     /// [`WorldError`] if the starting poses do not fit the grid.
@@ -561,7 +562,7 @@ impl FinishedRun {
         Ok(measures)
     }
 
-    /// Everything that happened in the run.
+    /// Repeats the run and records everything that happens.
     ///
     /// # Errors
     /// [`WorldError`] if the starting poses do not fit the grid.

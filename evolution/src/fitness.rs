@@ -1,23 +1,23 @@
-//! Fitness of your own: any number that can be read off the plain world, step by step.
+//! Custom fitness functions: any number computed from the plain world, step by step.
 //!
-//! The paper's fitness is counted by the fast engine, see
-//! [`generation_work`](crate::generation_work); [`Matches`] is the same on the plain world.
+//! The fast engine counts the paper's fitness, see [`generation_work`](crate::generation_work);
+//! [`Matches`] computes the same value in the plain world.
 
 use minimal_surprise_controller::{Controller, Genome};
 use minimal_surprise_sim::evaluation::{matches_of, run};
 use minimal_surprise_sim::{Scenario, Trial, World, WorldError};
 use rayon::prelude::*;
 
-/// What one run of a swarm is worth.
+/// Fitness of one run of a swarm.
 pub trait Fitness {
-    /// Sees the world after each step.
+    /// Observes the world after each step.
     fn observe(&mut self, world: &World);
 
-    /// The fitness of the run, once it has ended; more is better.
+    /// Returns the fitness after the run; higher is better.
     fn value(&self) -> u64;
 }
 
-/// Sensor bits predicted right: the paper's fitness (Eq. 1).
+/// Number of correctly predicted sensor bits: the paper's fitness (Eq. 1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Matches(u64);
 
@@ -31,7 +31,7 @@ impl Fitness for Matches {
     }
 }
 
-/// The fitness of every genome, by slot: that of its worst trial. Genomes are evaluated in parallel.
+/// Evaluates genomes in parallel; returns the fitness of each, that of its worst trial, by slot.
 ///
 /// # Errors
 /// [`WorldError`] if a trial's poses do not fit the grid.

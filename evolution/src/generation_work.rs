@@ -1,14 +1,14 @@
-//! The evaluations of a generation, dealt to the threads.
+//! Evaluations of a generation, distributed over the threads.
 //!
-//! Every thread takes the next task as soon as it is free. Genomes differ in what they cost, so
-//! that a thread may wait for another at the end; the last genomes are therefore dealt in halves of
-//! their repetitions. Which thread does what enters no result.
+//! Every thread takes the next task as soon as it is free. Evaluation times differ between genomes,
+//! so that a thread may wait for another at the end; the last genomes are therefore split into
+//! halves of their repetitions. Results do not depend on which thread does which task.
 
 use minimal_surprise_controller::{Genome, Topology};
 use minimal_surprise_sim::{Engine, EnginePath, Evaluation, Evaluator, Scenario, Trial, TrialSet};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Genomes whose repetitions are dealt in halves.
+/// Number of genomes whose repetitions are split into halves.
 const HALVED: usize = 8;
 
 /// The evaluations of a generation.
@@ -21,7 +21,7 @@ pub struct GenerationWork<'a> {
     tasks: Vec<Task>,
 }
 
-/// A genome, and what it is evaluated on.
+/// A genome and the trials to evaluate it on.
 #[derive(Clone, Copy, Debug)]
 struct Task {
     slot: usize,
@@ -29,10 +29,10 @@ struct Task {
 }
 
 impl<'a> GenerationWork<'a> {
-    /// The genomes of a generation and the trials that they share.
+    /// Prepares the evaluation of a generation's genomes on shared trials.
     ///
     /// # Panics
-    /// If there is no trial.
+    /// If `trials` is empty.
     #[must_use]
     pub fn new(
         scenario: &Scenario,
@@ -41,7 +41,7 @@ impl<'a> GenerationWork<'a> {
         genomes: &'a [Genome],
     ) -> Self {
         let set = |trials: &[Trial]| TrialSet::new(*scenario, topology.model(), trials.to_vec());
-        // Noise is prepared once for every set of trials, and evens out what genomes cost.
+        // Noise is prepared once for every trial set, and evens out the evaluation times.
         let halves = if scenario.noise().is_none() && trials.len() > 1 {
             let middle = trials.len() / 2;
             let (first, second) = trials.split_at(middle);
@@ -68,14 +68,14 @@ impl<'a> GenerationWork<'a> {
         }
     }
 
-    /// All trials.
+    /// Returns all trials.
     #[must_use]
     pub fn trials(&self) -> &TrialSet {
         &self.whole
     }
 
-    /// Evaluates all genomes on the threads of the current pool; by slot. Nothing comes back if
-    /// `stop` was set on the way.
+    /// Evaluates all genomes on the threads of the current pool; returns the evaluations by slot,
+    /// or `None` if `stop` was set before the end.
     #[must_use]
     pub fn evaluate(
         &self,
@@ -127,7 +127,7 @@ impl<'a> GenerationWork<'a> {
     }
 }
 
-/// The part with the fewest matches; of equals, the first.
+/// Returns the part with the fewest matches; ties go to the first.
 fn worst(parts: [Option<Evaluation>; 2]) -> Option<Evaluation> {
     parts.into_iter().flatten().min_by_key(|part| part.matches)
 }

@@ -1,4 +1,4 @@
-//! Genome files: read once, checked, with what they say of themselves.
+//! Genome files, read and checked once, with the topology and provenance that they state.
 
 use crate::files::{self, FileError};
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
@@ -13,25 +13,25 @@ pub struct GenomeFile {
     provenance: Provenance,
 }
 
-/// A file is no genome for this program.
+/// Error: a file holds no genome that this program can run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GenomeFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// It holds no genome for this program.
+    /// The file holds no genome that this program can run.
     #[error("{}: {error}", path.display())]
     Genome {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error in its contents.
         error: DecodeError,
     },
 }
 
 impl GenomeFileError {
-    /// Returns what is wrong, without the path.
+    /// Returns the error without the path.
     #[must_use]
     pub fn problem(&self) -> String {
         match self {
@@ -45,7 +45,7 @@ impl GenomeFile {
     /// Reads and checks a file.
     ///
     /// # Errors
-    /// [`GenomeFileError`] if it cannot be read, or is no genome for this program.
+    /// [`GenomeFileError`] if the file cannot be read or holds no genome for this program.
     pub fn read(path: &Path) -> Result<Self, GenomeFileError> {
         let bytes = files::read(path, CONTAINER_BYTES_MAX as u64)?;
         let encoded = EncodedGenome::decode(&bytes).map_err(|error| GenomeFileError::Genome {
@@ -59,25 +59,25 @@ impl GenomeFile {
         })
     }
 
-    /// The genome.
+    /// Returns the genome.
     #[must_use]
     pub fn genome(&self) -> &Genome {
         &self.genome
     }
 
-    /// Its topology.
+    /// Returns the genome's topology.
     #[must_use]
     pub fn topology(&self) -> Topology {
         self.genome.topology()
     }
 
-    /// Returns where the genome comes from.
+    /// Returns the genome's provenance.
     #[must_use]
     pub fn provenance(&self) -> Provenance {
         self.provenance
     }
 
-    /// The container: the bytes of the file.
+    /// Returns the container: the bytes of the file.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.bytes

@@ -1,4 +1,4 @@
-//! Locks: which process uses a directory.
+//! Directory locks, which name the process that uses a directory.
 
 use crate::files::FileError;
 use std::fmt;
@@ -6,20 +6,20 @@ use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
 use std::path::Path;
 
-/// The lock file in the directory. It names the holder of the lock.
+/// The lock file in the directory. It contains the holder of the lock.
 pub const LOCK: &str = ".lock";
 
-/// A directory locked by this process until this is dropped. On a file system without locks, it
-/// holds nothing.
+/// A directory locked by this process until this value is dropped. On a file system without locks,
+/// the directory is not locked.
 #[derive(Debug)]
 pub struct Lock {
     _file: Option<File>,
 }
 
-/// A directory could not be locked.
+/// Error: a directory could not be locked.
 #[derive(Debug)]
 pub enum LockError {
-    /// Another process holds the lock; it is named unless it took the lock just now.
+    /// Another process holds the lock; `None` if it took the lock only a moment ago.
     Held(Option<Holder>),
     /// The lock file could not be used.
     File(FileError),
@@ -47,7 +47,7 @@ impl Lock {
         let mut file = file.map_err(LockError::File)?;
         match file.try_lock() {
             Ok(()) => {
-                // Only informs others; if it fails, the lock is held all the same.
+                // For information only: if writing fails, the lock is still held.
                 let _ = Holder::this_process().write(&mut file);
                 Ok(Self { _file: Some(file) })
             }
@@ -56,7 +56,7 @@ impl Lock {
         }
     }
 
-    /// Locks a directory whose last holder was a process of this host that has ended. Some file
+    /// Locks a directory if its last holder was a process on this host that has exited. Some file
     /// systems do not show locks to other hosts, so a holder on another host may still be running.
     pub fn take_abandoned(directory: &Path) -> Option<Self> {
         let options = File::options()
@@ -78,8 +78,8 @@ impl Holder {
         }
     }
 
-    /// Overwrites the last holder's line in one step, then cuts off a longer rest; readers use only
-    /// the first line.
+    /// Overwrites the last holder's line in one write, then truncates the file after it; readers
+    /// use only the first line.
     fn write(&self, file: &mut File) -> std::io::Result<()> {
         let line = format!("{} {}\n", self.host, self.process);
         file.write_all(line.as_bytes())?;
@@ -91,7 +91,7 @@ impl Holder {
         let mut text = String::new();
         file.take(400).read_to_string(&mut text).ok()?;
         let (host, process) = text.split_once('\n')?.0.rsplit_once(' ')?;
-        // It is printed on terminals.
+        // The name is printed on terminals.
         let is_name = host.chars().all(|c| c.is_ascii_graphic());
         is_name.then_some(Self {
             host: host.to_owned(),

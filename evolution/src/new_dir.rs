@@ -1,7 +1,7 @@
 //! Directories that appear complete or not at all, even if several processes create the same one.
 //!
-//! A directory is created beside its place under a temporary name, then renamed. It is locked until
-//! then, so that leftovers of killed processes can be told from directories still being written.
+//! A directory is created beside its final path under a temporary name, then renamed. It is locked
+//! until then, which distinguishes directories being written from leftovers of killed processes.
 
 use crate::files::{self, FileError};
 use crate::lock::{LOCK, Lock, LockError};
@@ -17,17 +17,17 @@ pub struct NewDir {
 }
 
 impl NewDir {
-    /// Creates an empty, locked directory beside its place, and all missing parents.
+    /// Creates an empty, locked directory beside its final path, and all missing parents.
     ///
     /// # Errors
-    /// [`FileError`] if the place exists ([`FileError::is_exists`]), or the directory cannot be
-    /// created.
+    /// [`FileError`] if the final path exists ([`FileError::is_exists`]), or the directory cannot
+    /// be created.
     pub fn beside(place: &Path) -> Result<Self, FileError> {
         refuse_existing(place)?;
         Self::unchecked_beside(place)
     }
 
-    /// [`NewDir::beside`], but the place may exist; publishing then fails.
+    /// Like [`NewDir::beside`], but the final path may exist; publishing then fails.
     ///
     /// # Errors
     /// [`FileError`] if the directory cannot be created.
@@ -47,23 +47,23 @@ impl NewDir {
                 }
                 Err(error) => error,
             };
-            // It is empty and unused: failure to remove it is ignored.
+            // The directory is empty and unused: failure to remove it is ignored.
             let _ = fs::remove_dir_all(&part);
             match error {
-                // Another process's cleanup looked at it before it was locked.
+                // Another process's cleanup opened the directory before it was locked.
                 LockError::Held(_) => {}
                 LockError::File(error) => return Err(FileError::at(place)(error.error)),
             }
         }
     }
 
-    /// Returns the temporary path, where its files are written.
+    /// Returns the temporary path, under which the files are written.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.part
     }
 
-    /// Rewrites an error about a file in it to name the file's final place.
+    /// Rewrites an error about a file in the directory to show the file's final path.
     pub fn in_place(&self, error: FileError) -> FileError {
         match error.path.strip_prefix(&self.part) {
             Ok(file) => FileError::at(&self.place.join(file))(error.error),
@@ -71,40 +71,40 @@ impl NewDir {
         }
     }
 
-    /// Renames it to its place, without the lock file.
+    /// Renames the directory to its final path, without the lock file.
     ///
     /// # Errors
-    /// As [`NewDir::publish_locked`].
+    /// Those of [`NewDir::publish_locked`].
     pub fn publish(self) -> Result<(), FileError> {
-        // Cosmetic: failure to remove it is ignored.
+        // Cosmetic: failure to remove the lock file is ignored.
         let _ = fs::remove_file(self.part.join(LOCK));
         self.publish_locked().map(drop)
     }
 
-    /// Renames it to its place, where it stays locked.
+    /// Renames the directory to its final path and keeps it locked.
     ///
     /// # Errors
-    /// [`FileError`] if the place exists now ([`FileError::is_exists`]), or the directory cannot be
-    /// renamed; it is then removed.
+    /// [`FileError`] if the final path exists now ([`FileError::is_exists`]), or the directory
+    /// cannot be renamed; the directory is then removed.
     pub fn publish_locked(mut self) -> Result<Lock, FileError> {
         if let Err(error) = fs::rename(&self.part, &self.place) {
             refuse_existing(&self.place)?;
             return Err(FileError::at(&self.place)(error));
         }
-        Ok(self.lock.take().expect("it is held until now"))
+        Ok(self.lock.take().expect("held until now"))
     }
 }
 
 impl Drop for NewDir {
     fn drop(&mut self) {
         if self.lock.is_some() {
-            // It is unused: failure to remove it is ignored.
+            // The directory is unused: failure to remove it is ignored.
             let _ = fs::remove_dir_all(&self.part);
         }
     }
 }
 
-/// Needed because a rename replaces an empty directory.
+/// Rejects an existing path, because a rename would replace an empty directory.
 fn refuse_existing(place: &Path) -> Result<(), FileError> {
     match place.symlink_metadata() {
         Ok(_) => Err(FileError::exists(place)),
@@ -112,15 +112,15 @@ fn refuse_existing(place: &Path) -> Result<(), FileError> {
     }
 }
 
-/// Removes the unfinished directories that killed processes of this host left in a directory.
-/// Locked ones are still being written; on a file system without locks, nothing is removed.
+/// Removes unfinished directories left in a directory by killed processes of this host. Locked ones
+/// are still being written; on a file system without locks, nothing is removed.
 pub fn remove_abandoned(directory: &Path) {
     for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
         if !files::is_part(&entry.file_name()) {
             continue;
         }
         if let Some(_lock) = Lock::take_abandoned(&entry.path()) {
-            // Cosmetic: failure to remove it is ignored.
+            // Cosmetic: failure to remove the directory is ignored.
             let _ = fs::remove_dir_all(entry.path());
         }
     }
@@ -142,12 +142,12 @@ mod tests {
         let scratch = tempfile::tempdir().unwrap();
         let place = scratch.path().join("place");
         let making = NewDir::beside(&place).unwrap();
-        // As after a kill: the directory exists, and its lock is free.
+        // As if its process had been killed: the directory exists and is not locked.
         let abandoned = NewDir::beside(&place).unwrap();
         fs::write(abandoned.path().join("file"), "text").unwrap();
         let mut abandoned = std::mem::ManuallyDrop::new(abandoned);
         abandoned.lock = None;
-        // As on another host, whose locks are not seen here.
+        // As if created on another host, whose locks are not visible here.
         let elsewhere = scratch.path().join(files::beside(&place));
         fs::create_dir(&elsewhere).unwrap();
         fs::write(elsewhere.join(LOCK), "another-host 1\n").unwrap();

@@ -1,8 +1,8 @@
-//! The genetic algorithm: ask for genomes, tell their fitness. It knows no world.
+//! The genetic algorithm, with an ask-and-tell interface and independent of the world.
 //!
-//! The best genome stays in its slot; every other slot draws a parent from all, the best included,
-//! and [varies](crate::variation) it. Fitness is an integer, such as a number of matches. Every draw
-//! comes from the seed tree, by generation and slot.
+//! The best genome stays in its slot; every other slot draws a parent from all slots, including the
+//! best, and [varies](crate::variation) it. Fitness is an integer, such as a number of matches.
+//! Every draw comes from the seed tree, by generation and slot.
 
 use crate::selection::SelectParent;
 use crate::variation::Variation;
@@ -17,7 +17,7 @@ pub struct Population {
 }
 
 impl Population {
-    /// The first generation: random genomes.
+    /// Creates the first generation from random genomes.
     #[must_use]
     pub fn random(topology: Topology, size: u32, seeds: SeedTree) -> Self {
         let genome = |slot| {
@@ -30,7 +30,7 @@ impl Population {
         }
     }
 
-    /// The first generation: a genome in slot 0 and its mutants in the others.
+    /// Creates the first generation: a genome in slot 0 and its mutants in all other slots.
     #[must_use]
     pub fn mutants_of(ancestor: &Genome, size: u32, rate: MutationRate, seeds: SeedTree) -> Self {
         let genome = |slot| {
@@ -46,7 +46,7 @@ impl Population {
         }
     }
 
-    /// A generation stored earlier.
+    /// Restores a stored generation.
     #[must_use]
     pub fn restored(generation: u32, genomes: Vec<Genome>) -> Self {
         Self {
@@ -55,33 +55,33 @@ impl Population {
         }
     }
 
-    /// Number of the generation, from 0.
+    /// Returns the number of the generation, from 0.
     #[must_use]
     pub fn generation(&self) -> u32 {
         self.generation
     }
 
-    /// Ask: the genomes to evaluate, by slot.
+    /// Returns the genomes to evaluate, by slot.
     #[must_use]
     pub fn ask(&self) -> &[Genome] {
         &self.genomes
     }
 
-    /// Tell: the genomes' fitness, by slot; the next generation comes back. The best genome stays
-    /// in its slot; every other slot gets a child of drawn parents.
+    /// Creates the next generation from the genomes' fitness, by slot. The best genome stays in its
+    /// slot; every other slot gets a child of randomly drawn parents.
     ///
     /// # Panics
-    /// Unless there is one fitness per genome.
+    /// If the number of fitness values differs from the number of genomes.
     #[must_use]
     pub fn tell(&self, fitness: &[u64], variation: Variation, seeds: SeedTree) -> Self {
         let parents = variation.selection.of(fitness);
         self.tell_parents(fitness, &parents, variation, seeds)
     }
 
-    /// The same with a selection of your own; that of `variation` is not used.
+    /// Like [`tell`](Self::tell), with a custom selection instead of that of `variation`.
     ///
     /// # Panics
-    /// Unless there is one fitness per genome.
+    /// If the number of fitness values differs from the number of genomes.
     #[must_use]
     pub fn tell_parents(
         &self,

@@ -1,23 +1,23 @@
-//! Range checks on values read from a run directory, made while parsing: a value out of range is an
-//! error that names its position, so that drawings and loops only see valid values.
+//! Range checks on values read from a run directory, made while parsing: a value out of range
+//! causes an error with its position, so that drawings and loops only see valid values.
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
-/// Longest valid time, in seconds: about 300 years.
+/// Maximum valid time, in seconds: about 300 years.
 const SECONDS_MAX: f64 = 1e10;
 
-/// A number from 0 to 1.
+/// Reads a number from 0 to 1.
 pub(crate) fn fraction<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     f64::deserialize(from).and_then(to_1)
 }
 
-/// Numbers from 0 to 1.
+/// Reads numbers from 0 to 1.
 pub(crate) fn fractions<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
     Vec::deserialize(from)?.into_iter().map(to_1).collect()
 }
 
-/// A time in seconds.
+/// Reads a time in seconds.
 pub(crate) fn seconds<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     let value = f64::deserialize(from)?;
     if (0.0..=SECONDS_MAX).contains(&value) {
@@ -28,13 +28,13 @@ pub(crate) fn seconds<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Erro
     )))
 }
 
-/// A hash.
+/// Reads a hash.
 pub(crate) fn hash<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
     let text = String::deserialize(from)?;
     hash_of(&text).map_err(D::Error::custom)
 }
 
-/// A hash, if there is one.
+/// Reads a hash that may be missing.
 pub(crate) fn optional_hash<'de, D: Deserializer<'de>>(
     from: D,
 ) -> Result<Option<String>, D::Error> {
@@ -50,7 +50,7 @@ fn to_1<E: Error>(value: f64) -> Result<f64, E> {
     Err(E::custom(format!("{value}; expected a number from 0 to 1")))
 }
 
-/// A SHA-256 as in a file, with white space around it.
+/// Parses a SHA-256 from a file, ignoring surrounding white space.
 pub(crate) fn hash_of(text: &str) -> Result<String, String> {
     let hash = text.trim();
     let is_digit = |c: char| matches!(c, '0'..='9' | 'a'..='f');

@@ -1,5 +1,5 @@
-//! Re-evaluation: a genome from new starts, under the conditions it evolved in or others, and
-//! after damage (paper, Secs. 3.3.2 and 3.4).
+//! Re-evaluation of a genome from new starts, with the settings it evolved with or different ones,
+//! and after damage (paper, Secs. 3.3.2 and 3.4).
 
 use crate::finished_run::FinishedRun;
 use minimal_surprise_controller::{Controller, Genome};
@@ -15,20 +15,20 @@ use rayon::prelude::*;
 pub struct Rerun {
     /// Fitness, 0 to 1.
     pub fitness: f64,
-    /// Structures that the run is named after.
+    /// Dominant structures of the final state.
     pub names: Vec<Structure>,
-    /// Share of robots in each structure at the end, as [`Structure::ALL`].
+    /// Final share of robots in each structure, in the order of [`Structure::ALL`].
     pub shares: [f64; 8],
-    /// Which way its lines run; none without lines.
+    /// Orientation of the lines; `None` without lines.
     pub orientation: Option<LineOrientation>,
-    /// Poses at the end.
+    /// Final poses.
     pub final_poses: Vec<Pose>,
 }
 
 /// Runs a genome from this many new starts, in parallel.
 ///
 /// # Errors
-/// [`WorldError`] does not come up: starts are drawn on the scenario's own grid.
+/// None in practice: starts are drawn on the scenario's own grid.
 pub fn rerun(
     genome: &Genome,
     conditions: &Scenario,
@@ -56,26 +56,26 @@ pub fn rerun(
 /// A row of the paper's Tables 7 and 8: one value per repetition in every column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResilienceRow {
-    /// What was done.
+    /// Name of the condition.
     pub name: String,
-    /// Robots present.
+    /// Number of robots present.
     pub robots: Vec<f64>,
     /// Fitness over the run, 0 to 1.
     pub fitness: Vec<f64>,
     /// Share of the robots present in the structure at the start, 0 to 1.
     pub share_start: Vec<f64>,
-    /// The same at the end.
+    /// Share of the robots present in the structure at the end, 0 to 1.
     pub share_end: Vec<f64>,
-    /// Similarity of the end to the undamaged final state, 0 to 1.
+    /// Similarity of the last state to the undamaged final state, 0 to 1.
     pub similarity: Vec<f64>,
 }
 
-/// The rows of Tables 7 and 8 for a run: as it evolved, from new starts, and after damage.
+/// Computes the rows of Tables 7 and 8 for a run: as it evolved, from new starts, and after damage.
 ///
-/// Without noise a removal is the same every time and is run once.
+/// Without noise, every repetition of a removal gives the same result, so it is run once.
 ///
 /// # Errors
-/// [`DamageError`] if the area or what is left of the swarm cannot be run.
+/// [`DamageError`] if the damaged area is invalid or the remaining swarm cannot be run.
 pub fn resilience(
     finished: &FinishedRun,
     structure: Structure,
@@ -96,10 +96,10 @@ pub fn resilience(
     Ok(vec![initial, starts, damaged])
 }
 
-/// The row of [`resilience`] that is about the damage.
+/// Computes the row of [`resilience`] after damage.
 ///
 /// # Errors
-/// [`DamageError`] if the area or what is left of the swarm cannot be run.
+/// [`DamageError`] if the damaged area is invalid or the remaining swarm cannot be run.
 pub fn after_damage(
     finished: &FinishedRun,
     structure: Structure,
@@ -152,13 +152,14 @@ fn resilience_row(
     })
 }
 
-/// Mean; 0 of nothing.
+/// Returns the mean; 0 if there are no values.
 #[must_use]
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Median, the mean of the middle two of an even number; 0 of nothing.
+/// Returns the median; for an even number of values, the mean of the middle two; 0 if there are
+/// none.
 #[must_use]
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();

@@ -1,6 +1,6 @@
-//! Run directories: everything a run leaves behind, in the files of [`run_files`](crate::run_files).
+//! Run directories: everything that a run writes, in the files of [`run_files`](crate::run_files).
 //!
-//! No directory is used twice, and no file in it is ever half-written.
+//! No directory is used twice, and no file in it is ever partially written.
 
 use crate::checkpoint::{self, CheckpointError};
 use crate::experiment::{EvolutionResult, Experiment};
@@ -21,19 +21,19 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// A run directory, held by this process alone.
+/// A run directory, locked by this process.
 #[derive(Debug)]
 pub struct RunDir {
     path: PathBuf,
     settings_text: String,
     timer: Timer,
-    /// Whether the table is kept until the run is complete.
+    /// If true, `generations.csv` is written only when the run is complete.
     table_last: bool,
-    /// Holds the lock for as long as it lives.
+    /// Holds the lock until this value is dropped.
     _lock: Option<Lock>,
 }
 
-/// An evolution between two generations, ready to be written.
+/// The state of an evolution between two generations, ready to be written.
 #[derive(Clone, Debug)]
 pub struct Checkpoint {
     state: Vec<u8>,
@@ -41,56 +41,56 @@ pub struct Checkpoint {
     time: String,
 }
 
-/// A run directory cannot be used.
+/// Error: a run directory cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunDirError {
-    /// There is something already; nothing is ever overwritten.
-    #[error("{} exists; name a directory that does not, or continue with --resume", .0.display())]
+    /// The path already exists; nothing is ever overwritten.
+    #[error("{} exists; choose a new directory, or resume the run with --resume", .0.display())]
     Exists(PathBuf),
-    /// There is no such directory.
+    /// The directory does not exist.
     #[error(transparent)]
     NotThere(FileError),
-    /// The directory holds no run.
+    /// The directory contains no run.
     #[error("{} is not a run directory: it has no {missing}", path.display())]
     NotARun {
         /// The directory.
         path: PathBuf,
-        /// The file that it should have.
+        /// The missing file.
         missing: &'static str,
     },
-    /// A file of it cannot be read back.
+    /// A file of the run cannot be read.
     #[error(transparent)]
     Damaged(#[from] ReadRunError),
-    /// Another process works on the run.
+    /// Another process is working on the run.
     #[error("{} is in use by {}", path.display(), lock::named(holder.as_ref()))]
     InUse {
         /// The directory.
         path: PathBuf,
-        /// Who it is, if its lock says so.
+        /// That process, if the lock file names it.
         holder: Option<Holder>,
     },
     /// A file cannot be used.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The environment asks for an unknown path of the engine.
+    /// The environment variable names an unknown engine path.
     #[error(transparent)]
     EnginePath(#[from] PathError),
-    /// It takes more than this machine has.
+    /// The run needs more than this machine has.
     #[error(transparent)]
     TooMuch(#[from] TooMuch),
-    /// The checkpoint in it cannot be continued from.
+    /// The checkpoint cannot be resumed.
     #[error("{}: {error}", path.display())]
     Checkpoint {
         /// The checkpoint.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         error: CheckpointError,
     },
 }
 
 impl RunDirError {
-    /// Returns what is wrong, without what to do about it.
+    /// Returns the error without advice on what to do.
     #[must_use]
     pub fn cause(&self) -> &dyn std::error::Error {
         match self {
@@ -99,8 +99,8 @@ impl RunDirError {
         }
     }
 
-    /// Whether it is about this run alone, so that others can be done all the same: not a disk that
-    /// is full, a folder that no run can be made in, or what this machine has not.
+    /// Checks whether the error affects this run only, so that other runs can continue. A full
+    /// disk, an unwritable folder or too little memory affects all runs.
     #[must_use]
     pub fn is_of_one_run(&self, run: &Path) -> bool {
         match self {
@@ -114,7 +114,7 @@ impl RunDirError {
     }
 }
 
-/// What `--resume` finds.
+/// A run opened for `--resume`.
 #[derive(Debug)]
 pub enum Opened {
     /// A run that can be resumed.
@@ -124,10 +124,10 @@ pub enum Opened {
 }
 
 impl RunDir {
-    /// Makes the directory and everything that a run needs to be continued.
+    /// Creates the directory with everything needed to resume the run.
     ///
     /// # Errors
-    /// [`RunDirError::Exists`], or a file that cannot be written.
+    /// [`RunDirError::Exists`] if the path exists; other variants if a file cannot be written.
     pub fn create(
         path: &Path,
         experiment: &Experiment,
@@ -147,17 +147,17 @@ impl RunDir {
             .and_then(|()| files::replace(&run.file(META), meta.as_bytes()))
             .and_then(|()| files::replace(&run.file(CONFIG), run.settings_text.as_bytes()))
             .map_err(|error| new.in_place(error))?;
-        // Under its own name from here on, complete: a directory of that name is always a run.
+        // Published complete under its final name: a directory with that name is always a run.
         run._lock = Some(new.publish_locked().map_err(exists_or_file)?);
         run.path = path.to_owned();
         Ok(run)
     }
 
-    /// [`RunDir::create`] under a name made of the settings; a number is added if there is one
-    /// already.
+    /// Like [`RunDir::create`], with a name derived from the settings; a number is appended if the
+    /// name is taken.
     ///
     /// # Errors
-    /// [`RunDirError`] if nothing can be written.
+    /// [`RunDirError`] if the directory cannot be written.
     pub fn create_named(
         parent: &Path,
         experiment: &Experiment,
@@ -177,11 +177,11 @@ impl RunDir {
         Err(RunDirError::Exists(parent.join(name)))
     }
 
-    /// Opens a run to resume it with this many threads.
+    /// Opens a run to resume it with this number of threads.
     ///
     /// # Errors
-    /// [`RunDirError`] if there is no run, it is in use, it was changed or damaged, or it takes more
-    /// than this machine has.
+    /// [`RunDirError`] if the run is missing, in use, changed or damaged, or needs more memory than
+    /// this machine has.
     pub fn open(path: &Path, threads: f64) -> Result<Opened, RunDirError> {
         let missing = |missing| RunDirError::NotARun {
             path: path.to_owned(),
@@ -197,7 +197,7 @@ impl RunDir {
             return Err(missing(CONFIG));
         }
         let lock = lock(path)?;
-        // Check again: the previous holder of the lock may have completed it.
+        // Check again: the previous holder of the lock may have completed the run.
         if let Some(hash) = finished(path)? {
             return Ok(Opened::Finished(hash));
         }
@@ -214,23 +214,23 @@ impl RunDir {
         Ok(Opened::Unfinished(Box::new(experiment), run))
     }
 
-    /// Checks whether an incomplete run can be resumed, if there is enough memory to read it.
+    /// Checks whether an incomplete run can be resumed. Skips runs that do not fit into memory.
     ///
     /// # Errors
-    /// [`RunDirError`] if it cannot.
+    /// [`RunDirError`] if the run cannot be resumed.
     pub fn check_unfinished(path: &Path) -> Result<(), RunDirError> {
         let (settings, text) = settings_of_unfinished(path)?;
         if Needs::of_evolution(&settings, 1.0).check_memory().is_err() {
-            // It is not damaged only because it cannot be held here.
+            // Too little memory does not mean that the run is damaged.
             return Ok(());
         }
         unfinished(path, settings, &text).map(drop)
     }
 
-    /// For a run that others may be doing at the same time, unseen where the file system knows no
-    /// locks: the table appears when the run is complete. A slower process would otherwise put its
-    /// shorter table in the place of the complete one. Everything else that is written before the
-    /// end is a checkpoint, and any of them will do.
+    /// Delays `generations.csv` until the run is complete. Used if other processes may be doing the
+    /// same run, unnoticed because the file system has no locks: a slower process could otherwise
+    /// replace the complete table with its shorter one. All other files written before the end are
+    /// checkpoints, each of which is valid.
     #[must_use]
     pub fn with_table_last(mut self) -> Self {
         self.table_last = true;
@@ -240,12 +240,12 @@ impl RunDir {
     /// Saves an evolution between two generations.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be written; the last checkpoint is then still there.
+    /// [`FileError`] if a file cannot be written; the last checkpoint is kept.
     pub fn save(&self, experiment: &Experiment) -> Result<(), FileError> {
         self.write(&self.checkpoint(experiment))
     }
 
-    /// Returns what [`RunDir::save`] writes.
+    /// Returns the checkpoint that [`RunDir::save`] writes.
     #[must_use]
     pub fn checkpoint(&self, experiment: &Experiment) -> Checkpoint {
         Checkpoint {
@@ -258,7 +258,7 @@ impl RunDir {
     /// Writes a checkpoint.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be written; the last checkpoint is then still there.
+    /// [`FileError`] if a file cannot be written; the last checkpoint is kept.
     pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), FileError> {
         files::replace(&self.file(CHECKPOINT), &checkpoint.state)?;
         files::replace(&self.file(TIME), checkpoint.time.as_bytes())?;
@@ -280,7 +280,7 @@ impl RunDir {
         let mut buffer = [0; CONTAINER_BYTES_MAX];
         let genome = codec::encode(&result.genome, result.provenance, &mut buffer)
             .expect("the buffer holds any genome");
-        // Once more: the last checkpoint may have been written by a process that got no further.
+        // Written again: another process, killed since, may have written the last checkpoint.
         let table = generations(experiment);
         files::replace(&self.file(GENERATIONS), table.as_bytes())?;
         files::replace(&self.file(BEST), genome)?;
@@ -292,7 +292,7 @@ impl RunDir {
         tidy(&self.path)
     }
 
-    /// The directory.
+    /// Returns the directory.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -303,7 +303,7 @@ impl RunDir {
     }
 }
 
-/// The settings of a run that is not complete, and their text.
+/// Reads the settings of an incomplete run, and their text.
 fn settings_of_unfinished(path: &Path) -> Result<(Settings, String), RunDirError> {
     if !files::exists(&path.join(CHECKPOINT))? {
         return Err(RunDirError::NotARun {
@@ -332,7 +332,7 @@ fn unfinished(
     Ok((experiment, spent))
 }
 
-/// The hash of a complete run; what is not needed any more is removed.
+/// Returns the hash of a complete run, after removing files that are no longer needed.
 fn finished(directory: &Path) -> Result<Option<String>, RunDirError> {
     let Some(hash) = complete(directory)? else {
         return Ok(None);
@@ -342,11 +342,11 @@ fn finished(directory: &Path) -> Result<Option<String>, RunDirError> {
     Ok(Some(hash))
 }
 
-/// Removes what a complete run does not need: checkpoint, lock, and files whose writing was cut
-/// short. Another process may be removing them, too.
+/// Removes the files that a complete run does not need: checkpoint, lock, and partially written
+/// files. Another process may be removing them at the same time.
 ///
 /// # Errors
-/// [`FileError`] if something cannot be removed.
+/// [`FileError`] if a file cannot be removed.
 pub fn tidy(directory: &Path) -> Result<(), FileError> {
     let entries = fs::read_dir(directory).map_err(FileError::at(directory))?;
     for entry in entries.flatten() {
@@ -363,7 +363,7 @@ pub fn tidy(directory: &Path) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Takes the directory for this process.
+/// Locks the directory for this process.
 fn lock(directory: &Path) -> Result<Lock, RunDirError> {
     Lock::take(directory).map_err(|error| match error {
         LockError::Held(holder) => RunDirError::InUse {

@@ -6,7 +6,7 @@
 //! | `meta.json` | [`Meta`]: which program made the run |
 //! | `generations.csv` | one [`GenerationRow`] per generation |
 //! | `best.genome` | the last generation's best genome, as a container for robots |
-//! | `time.json` | [`TimeSpent`](crate::time_spent::TimeSpent), over all sittings |
+//! | `time.json` | [`TimeSpent`](crate::time_spent::TimeSpent), summed over all processes |
 //! | `final.json` | [`FinalFile`]: start, end, fitness and average predictions of the final run |
 //! | `DONE` | the run's hash; the run is complete |
 //! | `checkpoint` | until the run is complete: the state from which it is resumed |
@@ -30,31 +30,31 @@ pub const GENERATIONS: &str = "generations.csv";
 pub const BEST: &str = "best.genome";
 /// Start and end of the final run.
 pub const FINAL: &str = "final.json";
-/// How long the run took.
+/// Time that the run took.
 pub const TIME: &str = "time.json";
 /// Marks a run as complete, and holds its hash.
 pub const DONE: &str = "DONE";
-/// Until the run is complete: the state from which it is resumed.
+/// State from which an incomplete run is resumed.
 pub const CHECKPOINT: &str = "checkpoint";
 
-/// Files without which a complete run cannot be read, besides [`DONE`].
+/// Files required in a complete run, in addition to [`DONE`].
 pub const OF_COMPLETE: [&str; 5] = [CONFIG, META, BEST, FINAL, GENERATIONS];
 
 /// Version of the layout of `meta.json` and `final.json`.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// The program that makes a run.
+/// The program that produces a run.
 #[derive(Clone, Debug, Default)]
 pub struct Program {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its version.
+    /// Version.
     pub version: String,
-    /// The revision of its source.
+    /// Source revision.
     pub revision: String,
-    /// The compiler that built it.
+    /// Compiler.
     pub compiler: String,
-    /// How it was called.
+    /// Command line.
     pub command_line: Vec<String>,
 }
 
@@ -74,7 +74,7 @@ pub struct Meta {
 }
 
 impl Meta {
-    /// How a run with these settings is made.
+    /// Creates the provenance of a run with these settings.
     #[must_use]
     pub fn new(settings: &Settings, program: &Program) -> Self {
         let program = program.clone();
@@ -91,7 +91,7 @@ impl Meta {
         }
     }
 
-    /// The program in words.
+    /// Describes the program.
     #[must_use]
     pub fn program(&self) -> String {
         let Self {
@@ -104,7 +104,7 @@ impl Meta {
     }
 }
 
-/// `final.json`: the run of the last generation's best genome, from the start that gave it its
+/// `final.json`: the run of the last generation's best genome from the start that determined its
 /// fitness. Poses are `[x, y, heading]`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[allow(missing_docs)]
@@ -112,7 +112,7 @@ pub struct FinalFile {
     pub schema_version: u32,
     #[serde(deserialize_with = "ranges::hash")]
     pub hash: String,
-    /// Of version 1, in files of older programs.
+    /// Uses version 1, in files of older programs.
     #[serde(
         default,
         deserialize_with = "ranges::optional_hash",
@@ -177,7 +177,7 @@ impl From<&Measures> for MeasuresOfRun {
 }
 
 impl FinalFile {
-    /// The file of a result.
+    /// Creates the file contents for a result.
     #[must_use]
     pub fn new(settings: &Settings, result: &EvolutionResult) -> Self {
         let scenario = settings.scenario();
@@ -207,14 +207,14 @@ impl FinalFile {
     }
 }
 
-/// Names of structures.
+/// Returns the names of structures.
 #[must_use]
 pub fn names(structures: &[Structure]) -> Vec<String> {
     structures.iter().map(|s| s.name().to_owned()).collect()
 }
 
 /// A row of `generations.csv`. Movement, structure and share are those of the best genome in the
-/// repetition that gave it its fitness.
+/// repetition that determined its fitness.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct GenerationRow {
@@ -234,7 +234,7 @@ pub struct GenerationRow {
 }
 
 impl GenerationRow {
-    /// The row of a generation.
+    /// Creates the row of a generation.
     #[must_use]
     pub fn new(settings: &Settings, record: &GenerationRecord) -> Self {
         let scored = settings.scored_bits() as f64;
@@ -255,10 +255,10 @@ impl GenerationRow {
     }
 }
 
-/// The text of `generations.csv`.
+/// Formats `generations.csv`.
 ///
 /// # Panics
-/// Does not: rows of numbers are written to memory.
+/// Never: rows of numbers are written to memory.
 #[must_use]
 pub fn generations(experiment: &Experiment) -> String {
     let mut table = csv::Writer::from_writer(Vec::new());
@@ -271,10 +271,10 @@ pub fn generations(experiment: &Experiment) -> String {
     String::from_utf8(bytes).expect("numbers are ASCII")
 }
 
-/// The text of a JSON file.
+/// Formats a value as JSON.
 ///
 /// # Panics
-/// Does not for values whose keys are text, as all here.
+/// Only if a map in the value has keys that are not text, which no value here has.
 #[must_use]
 pub fn json(value: &impl Serialize) -> String {
     let mut text = serde_json::to_string_pretty(value).expect("plain values");
@@ -282,7 +282,7 @@ pub fn json(value: &impl Serialize) -> String {
     text
 }
 
-/// Poses without a line break for every number.
+/// Formats poses on one line instead of one line per number.
 fn one_line<S: Serializer>(poses: &[Pose], serializer: S) -> Result<S::Ok, S::Error> {
     let poses = to_raw_value(poses).map_err(serde::ser::Error::custom)?;
     poses.serialize(serializer)

@@ -1,4 +1,4 @@
-//! The hash of a run: what it computed, and nothing else.
+//! The hash of a run, which covers only what the run computed.
 //!
 //! A chain of SHA-256: `h ← SHA-256(h ‖ best ‖ total ‖ matches of slot 0, 1, …)` for every
 //! generation, starting from the SHA-256 of a fixed text; at the end
@@ -12,10 +12,10 @@ use minimal_surprise_sim::Pose;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// What the chain starts from.
+/// The text that starts the chain.
 const START: &[u8] = b"minimal surprise run, version 1";
 
-/// The chain after some generations.
+/// State of the chain after some generations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunHash([u8; 32]);
 
@@ -26,7 +26,7 @@ impl Default for RunHash {
 }
 
 impl RunHash {
-    /// Adds a generation's matches, by slot.
+    /// Returns the chain extended by a generation's matches, by slot.
     #[must_use]
     pub fn generation(self, matches: &[u64]) -> Self {
         let best = matches.iter().copied().max().unwrap_or(0);
@@ -38,7 +38,7 @@ impl RunHash {
         Self(hash.finalize().into())
     }
 
-    /// Ends the run: its best genome and the swarm's final poses.
+    /// Returns the final hash, which includes the best genome and the swarm's final poses.
     #[must_use]
     pub fn end(self, best: &Genome, final_poses: &[Pose]) -> Self {
         let mut hash = Sha256::new_with_prefix(self.0);

@@ -1,19 +1,19 @@
-//! Selection: which genomes become parents. All draws are of integers.
+//! Selection of the genomes that become parents. All draws are of integers.
 
 use minimal_surprise_sim::seed::{Stream, uniform_below};
 use std::fmt;
 
-/// Maximum number of genomes of a tournament.
+/// Maximum tournament size.
 const TOURNAMENT_MAX: u32 = 1_000_000;
 
-/// How parents are chosen.
+/// Selection method for parents.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Selection {
-    /// In proportion to fitness, as in the paper.
+    /// Probability proportional to fitness, as in the paper.
     #[default]
     Roulette,
-    /// The best of this many genomes, drawn with replacement; of equals, the first drawn.
+    /// The best of this many genomes, drawn with replacement; ties go to the first drawn.
     Tournament(u32),
 }
 
@@ -21,7 +21,7 @@ impl Selection {
     /// Reads `roulette` or `tournament:K`.
     ///
     /// # Errors
-    /// What would be valid.
+    /// A description of valid methods, if `text` is not one.
     pub fn parse(text: &str) -> Result<Self, String> {
         match text.split_once(':') {
             None if text == "roulette" => Ok(Self::Roulette),
@@ -35,10 +35,10 @@ impl Selection {
         }
     }
 
-    /// Ready to draw parents of genomes with these fitnesses, by slot.
+    /// Prepares to draw parents of genomes with these fitness values, by slot.
     ///
     /// # Panics
-    /// If there is no genome, or the fitnesses' sum does not fit 64 bits.
+    /// If `fitness` is empty, or the sum does not fit 64 bits.
     #[must_use]
     pub fn of(self, fitness: &[u64]) -> Parents<'_> {
         match self {
@@ -57,13 +57,13 @@ impl fmt::Display for Selection {
     }
 }
 
-/// Draws parents, one after the other: implement it for a selection of your own.
+/// Draws parents one after the other; implement this trait for a custom selection.
 pub trait SelectParent {
-    /// The slot of a parent.
+    /// Draws a parent and returns its slot.
     fn draw(&self, rng: &mut Stream) -> usize;
 }
 
-/// A [`Selection`] among some genomes.
+/// A [`Selection`] applied to a generation.
 #[derive(Clone, Debug)]
 pub enum Parents<'a> {
     /// See [`Selection::Roulette`].
@@ -72,7 +72,7 @@ pub enum Parents<'a> {
     Tournament {
         /// Fitness by slot.
         fitness: &'a [u64],
-        /// Genomes drawn for each parent.
+        /// Number of genomes drawn for each parent.
         size: u32,
     },
 }
@@ -96,18 +96,18 @@ impl SelectParent for Parents<'_> {
     }
 }
 
-/// A wheel with one sector per slot, as wide as the slot's fitness; all equal if all are 0.
+/// A wheel with one sector per slot, proportional to the slot's fitness; all equal if all are 0.
 #[derive(Clone, Debug)]
 pub struct Roulette {
-    /// Where each sector ends.
+    /// Upper limits of the sectors.
     ends: Vec<u64>,
 }
 
 impl Roulette {
-    /// A wheel for these fitnesses.
+    /// Creates a wheel for these fitness values.
     ///
     /// # Panics
-    /// If their sum does not fit 64 bits.
+    /// If the sum does not fit 64 bits.
     #[must_use]
     pub fn new(fitness: &[u64]) -> Self {
         let uniform = fitness.iter().all(|&count| count == 0);
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn of_k_drawn_genomes_the_best_wins() {
-        // With k of 4: the best of ranks up to r wins with (r/4)^k - ((r-1)/4)^k.
+        // With 4 genomes: the best of ranks up to r wins with probability (r/4)^k - ((r-1)/4)^k.
         let fitness = [5, 40, 20, 30];
         assert_near(&shares(Selection::Tournament(1), &fitness), &[0.25; 4]);
         let pairs = [1.0, 7.0, 3.0, 5.0].map(|wins| wins / 16.0);

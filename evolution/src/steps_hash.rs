@@ -1,4 +1,4 @@
-//! The hash of the steps of one run of a swarm: who sensed, did and expected what, and where.
+//! The hash of the steps of one run of a swarm: readings, actions, predictions and poses.
 //!
 //! A chain of SHA-256, so that a decoder can check the steps one at a time: it starts
 //! with the SHA-256 of a fixed text, the number of robots in 64 bits and their starting poses. Each
@@ -6,8 +6,8 @@
 //! bits each, its new prediction in 16 bits, and its pose afterwards. A pose is x and y in 16 bits
 //! each and the heading in 8. All little-endian.
 //!
-//! Under version 1 a reading also has the bits beyond the model's sensors that noise draws. Without
-//! noise both versions give the same hash.
+//! In version 1, a reading also has the bits drawn by noise beyond the sensors of the model.
+//! Without noise, both versions give the same hash.
 
 use crate::text::hex;
 use minimal_surprise_controller::SensorModel;
@@ -20,38 +20,38 @@ use std::fmt;
 /// A reading is hashed as 16 bits.
 const _: () = assert!(MAX_SENSORS <= u16::BITS as usize);
 
-/// What the chain starts with.
+/// The text that starts the chain.
 pub const START: &[u8] = b"minimal surprise steps, version 1";
 
-/// Which bits of a reading are hashed.
+/// Hashed bits of a reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Version {
     /// All sixteen bits, as hashed in `steps_hash`.
     V1,
-    /// Those of sensors: what runs record under `steps_hash_v2`.
+    /// The bits of sensors only, as hashed in `steps_hash_v2`.
     #[default]
     V2,
 }
 
-/// A hash of steps that a run recorded.
+/// A steps hash recorded by a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordedHash {
-    /// How it was made.
+    /// Version of the hash.
     pub version: Version,
     /// The hash.
     pub hash: String,
 }
 
-/// The chain after some steps.
+/// State of the chain after some steps.
 #[derive(Clone, Debug)]
 pub struct StepsHash {
     chain: [u8; 32],
-    /// Under version 1: the noise, and the bits of a reading that no sensor takes.
+    /// In version 1: the noise, and the bits of a reading that no sensor uses.
     beyond_sensors: Option<(NoiseStream, u16)>,
 }
 
 impl StepsHash {
-    /// A swarm at the start of a trial.
+    /// Creates the chain for a swarm at the start of a trial.
     #[must_use]
     pub fn new(version: Version, trial: &Trial, model: SensorModel) -> Self {
         let starts = &trial.starts;
@@ -67,7 +67,7 @@ impl StepsHash {
         }
     }
 
-    /// Adds the step that the world has just done.
+    /// Adds the world's latest step.
     pub fn observe(&mut self, world: &World) {
         let mut hash = Sha256::new_with_prefix(self.chain);
         let robots = world.readings().iter().zip(world.decisions());

@@ -1,5 +1,5 @@
-//! Escaping: text from users for file names, pages, links, shells, compilers and terminals, so that
-//! it cannot be read as anything else. And decoding: bytes of a text file into text.
+//! Text escaping and decoding. Escaping makes user text safe in file names, pages, links, shells,
+//! compilers and terminals; decoding turns the bytes of a text file into text.
 
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_decode_str, percent_encode};
 use sha2::{Digest, Sha256};
@@ -8,19 +8,19 @@ use std::ffi::{OsStr, OsString};
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
-/// Longest [`file_name`], in bytes: file systems allow 255, which leaves room for endings and
-/// temporary names.
+/// Maximum length of a [`file_name`], in bytes: file systems allow 255, which leaves room for
+/// endings and temporary names.
 pub const FILE_NAME_BYTES_MAX: usize = 100;
 
-/// Hexadecimal digits of the hash in a [`file_name`].
+/// Number of hexadecimal digits of the hash in a [`file_name`].
 const HASH_DIGITS: usize = 12;
 
-/// Device names on Windows, with any ending.
+/// Device names on Windows, reserved with any ending.
 const DEVICES: [&str; 6] = ["con", "prn", "aux", "nul", "com", "lpt"];
 
-/// A file name for any text. Different texts get different names, even on file systems that ignore
-/// case. A text of `a` to `z`, `0` to `9`, `-`, `_` and `.` is used as it is; any other keeps its
-/// letters and digits and gets a hash of the whole text at the end.
+/// Returns a file name for any text. Different texts get different names, even on file systems that
+/// ignore case. A text of `a` to `z`, `0` to `9`, `-`, `_` and `.` is used unchanged; any other
+/// text keeps its letters and digits, followed by a hash of the whole text.
 #[must_use]
 pub fn file_name(text: &str) -> String {
     if is_file_name(text) {
@@ -30,7 +30,7 @@ pub fn file_name(text: &str) -> String {
     }
 }
 
-/// [`file_name`] that avoids a name that is already taken.
+/// Like [`file_name`], but returns a name different from `taken`.
 #[must_use]
 pub fn file_name_except(text: &str, taken: &str) -> String {
     match file_name(text) {
@@ -72,8 +72,8 @@ fn hashed_file_name(text: &str) -> String {
     format!("{front}{trimmed}-{}", &hash[..HASH_DIGITS])
 }
 
-/// Whether a text can be its own file name. A text that ends like a name with a hash cannot: it
-/// could be the name of another text.
+/// Checks whether a text can be used unchanged as a file name. A text that ends like a hashed name
+/// cannot, because it could be the name of a different text.
 fn is_file_name(text: &str) -> bool {
     let plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b"-_.".contains(&b);
     let is_hash = |end: &str| {
@@ -97,13 +97,13 @@ fn is_device(name: &str) -> bool {
     DEVICES.contains(&stem.trim_end_matches(|c: char| c.is_ascii_digit()))
 }
 
-/// Bytes as hexadecimal digits, two each.
+/// Formats bytes as hexadecimal digits, two per byte.
 #[must_use]
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Maximum number of letters and digits of a text that [`identifier`] keeps: C distinguishes 63 characters.
+/// Maximum number of letters and digits that [`identifier`] keeps: C distinguishes 63 characters.
 const IDENTIFIER_MAX: usize = 24;
 
 /// Reserved words of C and Rust.
@@ -114,7 +114,7 @@ const KEYWORDS: &str = "abstract alignas alignof as async auto await become bool
     super switch thread_local trait true try type typedef typeof typeof_unqual union unsafe \
     unsigned unsized use virtual void volatile where while yield";
 
-/// Part of a C and Rust identifier, from any text: its first ASCII letters and digits.
+/// Returns part of a C and Rust identifier: the first ASCII letters and digits of a text.
 #[must_use]
 pub fn identifier(text: &str) -> String {
     let mut name = String::new();
@@ -132,7 +132,7 @@ pub fn identifier(text: &str) -> String {
 /// Checks an identifier for C and Rust.
 ///
 /// # Errors
-/// A description of valid identifiers.
+/// A description of valid identifiers, if `text` is not one.
 pub fn checked_identifier(text: &str) -> Result<&str, &'static str> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let is_keyword = KEYWORDS.split_whitespace().any(|keyword| keyword == text);
@@ -150,8 +150,8 @@ pub fn checked_identifier(text: &str) -> Result<&str, &'static str> {
     }
 }
 
-/// Whether a character is neither visible nor an ordinary space: control characters, line ends,
-/// changes of writing direction, characters without width.
+/// Checks whether a character is neither visible nor an ordinary space: control characters, line
+/// ends, text direction marks, zero-width characters.
 #[must_use]
 pub fn is_hidden(c: char) -> bool {
     c.is_control()
@@ -163,19 +163,19 @@ pub fn is_hidden(c: char) -> bool {
             | '\u{1d173}'..='\u{1d17a}' | '\u{e0000}'..='\u{e0fff}')
 }
 
-/// Text for a terminal, on one line: [hidden](is_hidden) characters as `\n`, `\u{1b}`.
+/// Escapes text for a terminal, on one line: [hidden](is_hidden) characters as `\n`, `\u{1b}`.
 #[must_use]
 pub fn terminal(text: &str) -> String {
     visible(text, "")
 }
 
-/// Text for a terminal, on several lines: line ends and tabs are kept.
+/// Escapes text for a terminal, on several lines: line ends and tabs are kept.
 #[must_use]
 pub fn terminal_lines(text: &str) -> String {
     visible(text, "\n\t")
 }
 
-/// A path for a terminal; bytes that are not text as `\xff`.
+/// Escapes a path for a terminal; bytes that are not UTF-8 as `\xff`.
 #[must_use]
 pub fn terminal_path(path: &Path) -> String {
     let mut shown = String::new();
@@ -200,7 +200,7 @@ fn visible(text: &str, but: &str) -> String {
     shown
 }
 
-/// Text for a terminal without UTF-8.
+/// Escapes text for a terminal without UTF-8.
 #[must_use]
 pub fn ascii(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
@@ -247,7 +247,7 @@ pub fn ascii(text: &str) -> String {
     shown
 }
 
-/// Text for HTML, also inside quotes.
+/// Escapes text for HTML, including inside quotes.
 #[must_use]
 pub fn html(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -264,7 +264,7 @@ pub fn html(text: &str) -> String {
     escaped
 }
 
-/// Text for Markdown: a paragraph, a list or a table cell.
+/// Escapes text for Markdown: a paragraph, a list or a table cell.
 #[must_use]
 pub fn markdown(text: &str) -> String {
     let shown = terminal(text);
@@ -292,7 +292,7 @@ pub fn markdown(text: &str) -> String {
     escaped
 }
 
-/// Text as code in Markdown.
+/// Formats text as code in Markdown.
 #[must_use]
 pub fn markdown_code(text: &str) -> String {
     let shown = terminal(text);
@@ -307,7 +307,7 @@ pub fn markdown_code(text: &str) -> String {
     format!("{fence}{pad}{shown}{pad}{fence}")
 }
 
-/// Text as code in a Markdown table cell, where a bar ends the cell even inside code.
+/// Formats text as code in a Markdown table cell, where a bar ends the cell even inside code.
 #[must_use]
 pub fn markdown_code_cell(text: &str) -> String {
     markdown_code(text).replace('|', r"\|")
@@ -320,7 +320,7 @@ const IN_URL: &AsciiSet = &NON_ALPHANUMERIC
     .remove(b'_')
     .remove(b'~');
 
-/// A path as a URL; a relative path gives a relative URL.
+/// Formats a path as a URL; a relative path gives a relative URL.
 #[must_use]
 pub fn url(path: &Path) -> String {
     let mut url = String::new();
@@ -339,11 +339,11 @@ pub fn url(path: &Path) -> String {
     url
 }
 
-/// The start of a text that stands for a path as a URL.
+/// Prefix of a text that holds a path as a URL.
 const FILE_URL: &str = "file://";
 
-/// A path as text, for [`path_of_text`] to restore: unchanged, or if it is not UTF-8, as a URL of
-/// the absolute path.
+/// Converts a path to text for [`path_of_text`] to restore: unchanged if it is UTF-8, otherwise as
+/// a URL of the absolute path.
 #[must_use]
 pub fn text_of_path(path: &Path) -> String {
     match path.to_str() {
@@ -355,7 +355,7 @@ pub fn text_of_path(path: &Path) -> String {
     }
 }
 
-/// The path that [`text_of_path`] wrote as this text.
+/// Returns the path that [`text_of_path`] converted to this text.
 #[must_use]
 pub fn path_of_text(text: &str) -> PathBuf {
     match text.strip_prefix(FILE_URL) {
@@ -374,8 +374,8 @@ fn os_string(bytes: Vec<u8>) -> OsString {
     String::from_utf8_lossy(&bytes).into_owned().into()
 }
 
-/// A word that a POSIX shell reads as this argument: printable, and on one line unless it ends with
-/// a line end.
+/// Quotes an argument for a POSIX shell: printable, and on one line unless the argument ends with a
+/// line end.
 #[must_use]
 pub fn shell_word(word: impl AsRef<OsStr>) -> String {
     let word = word.as_ref();
@@ -389,7 +389,8 @@ pub fn shell_word(word: impl AsRef<OsStr>) -> String {
     }
 }
 
-/// The word as output of `printf`. The shell drops line ends at the end of that, so they follow it.
+/// Quotes an argument as output of `printf`. The shell drops line ends at the end of a command's
+/// output, so they are appended after it.
 fn printf_word(word: &[u8]) -> String {
     let line_ends = word.iter().rev().take_while(|&&byte| byte == b'\n').count();
     let mut code = String::from("\"$(printf '");
@@ -416,7 +417,8 @@ fn octal(code: &mut String, bytes: &[u8]) {
     }
 }
 
-/// A path as a shell word; one that starts with a dash would be taken for a flag.
+/// Quotes a path for a shell. Without the prefix `./`, a path that starts with a dash would be
+/// taken for a flag.
 #[must_use]
 pub fn shell_path(path: &Path) -> String {
     if path.as_os_str().as_encoded_bytes().starts_with(b"-") {
@@ -426,14 +428,14 @@ pub fn shell_path(path: &Path) -> String {
     }
 }
 
-/// Bytes that are not text.
+/// Error: the bytes are not UTF-8 text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TextError {
     /// Text in UTF-16.
     #[error("the text is in UTF-16; save it as UTF-8")]
     Utf16,
-    /// Not UTF-8.
+    /// The bytes are not UTF-8.
     #[error("line {line}: byte {byte} of the file is not UTF-8; save it as UTF-8")]
     NotUtf8 {
         /// The line number, from 1.
@@ -443,13 +445,14 @@ pub enum TextError {
     },
 }
 
-/// The text of a text file, whichever program saved it: without a byte order mark, with lines
-/// ending in `\n`.
+/// Decodes a text file saved by any program: removes a byte order mark and ends all lines with
+/// `\n`.
 ///
 /// # Errors
-/// [`TextError`] if it is not UTF-8.
+/// [`TextError`] if the bytes are not UTF-8.
 pub fn decode(bytes: &[u8]) -> Result<String, TextError> {
-    // A byte order mark, or ASCII with zeros between: no UTF-8 text read here starts like this.
+    // A UTF-16 byte order mark, or ASCII alternating with zeros. No valid UTF-8 file starts like
+    // this.
     if matches!(
         bytes,
         [0xff, 0xfe, ..]

@@ -1,7 +1,7 @@
-//! How long a run took, summed over all processes that worked on it.
+//! Time that a run took, summed over all processes that worked on it.
 //!
-//! It is saved with every checkpoint, so that a killed process loses the time of at most one
-//! generation. It is not part of a result, and no hash covers it.
+//! The time is saved with every checkpoint, so that a killed process loses at most one generation's
+//! time. It is not part of a result and enters no hash.
 
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::ranges;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 
-/// `time.json`.
+/// The contents of `time.json`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TimeSpent {
     /// Wall-clock seconds.
@@ -20,15 +20,15 @@ pub struct TimeSpent {
     /// CPU seconds, summed over all threads.
     #[serde(deserialize_with = "ranges::seconds")]
     pub cpu_s: f64,
-    /// How often the run was started or resumed.
+    /// Number of processes that started or resumed the run.
     pub sittings: u32,
 }
 
 impl TimeSpent {
-    /// Reads the file in a run directory; a run of an older program has none.
+    /// Reads the file in a run directory; returns zero times for a run of an older program.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read or its numbers are not valid times.
+    /// [`FileError`] if the file cannot be read or its numbers are not valid times.
     pub fn read(run: &Path) -> Result<Self, FileError> {
         let path = run.join(TIME);
         if !files::exists(&path)? {
@@ -38,7 +38,7 @@ impl TimeSpent {
         read.map_err(|error: serde_json::Error| FileError::at(&path)(error.into()))
     }
 
-    /// The contents of the file.
+    /// Formats the contents of the file.
     #[must_use]
     pub fn json(&self) -> String {
         let rounded = Self {
@@ -51,7 +51,7 @@ impl TimeSpent {
         text
     }
 
-    /// The sum of both.
+    /// Returns the sum of two times.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self {
@@ -71,7 +71,7 @@ pub struct Timer {
 }
 
 impl Timer {
-    /// Starts measuring, after the time spent `before`.
+    /// Starts measuring; earlier processes spent `before`.
     #[must_use]
     pub fn after(before: TimeSpent) -> Self {
         Self {
@@ -81,7 +81,7 @@ impl Timer {
         }
     }
 
-    /// The time spent until now.
+    /// Returns the total time spent until now.
     #[must_use]
     pub fn spent(&self) -> TimeSpent {
         self.before.and(TimeSpent {

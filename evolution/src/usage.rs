@@ -1,9 +1,9 @@
-//! Time and memory use, from the operating system.
+//! Time and memory use, as reported by the operating system.
 
 #[cfg(not(unix))]
 use std::time::Instant;
 
-/// CPU time of this process since the start; elapsed time if the system does not report it.
+/// CPU time of this process since the start; elapsed time if the system does not report CPU time.
 #[derive(Clone, Copy, Debug)]
 pub struct Stopwatch {
     #[cfg(unix)]
@@ -24,7 +24,7 @@ impl Stopwatch {
         }
     }
 
-    /// Seconds since the start.
+    /// Returns the seconds since the start.
     #[must_use]
     pub fn cpu_seconds(self) -> f64 {
         #[cfg(unix)]
@@ -38,7 +38,7 @@ impl Stopwatch {
     }
 }
 
-/// Largest memory of any child process that has ended, in MB (10⁶ bytes).
+/// Returns the peak memory of any child process that has exited, in MB (10⁶ bytes).
 #[must_use]
 pub fn children_peak_rss_mb() -> Option<f64> {
     #[cfg(unix)]

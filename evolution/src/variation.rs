@@ -1,4 +1,4 @@
-//! Variation: how children differ from their parents.
+//! Variation: differences between children and their parents.
 
 use crate::selection::{SelectParent, Selection};
 use minimal_surprise_controller::{Genome, GenomeError, MutationRate};
@@ -6,10 +6,10 @@ use minimal_surprise_sim::seed::Stream;
 use minimal_surprise_sim::{Purpose, SeedTree};
 use rand_core::Rng as _;
 
-/// How the next generation is made: who becomes a parent, and what is changed in the children.
+/// Rules for creating the next generation: the selection of parents and the changes to children.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variation {
-    /// How parents are chosen.
+    /// Selection method for parents.
     pub selection: Selection,
     /// Probability that a child has two parents, in units of 2⁻³².
     pub crossover_per_2_32: u64,
@@ -18,7 +18,7 @@ pub struct Variation {
 }
 
 impl Variation {
-    /// The child in a slot of a generation.
+    /// Creates the child in a slot of a generation.
     pub(crate) fn child(
         &self,
         genomes: &[Genome],
@@ -41,10 +41,10 @@ impl Variation {
     }
 }
 
-/// A genome with each weight from the other parent wherever `from_other` says so.
+/// Returns a genome with the weights of `other` wherever `from_other` is true.
 ///
 /// # Errors
-/// [`GenomeError`] if the other parent has more or fewer weights.
+/// [`GenomeError`] if the parents have different numbers of weights.
 pub fn uniform_crossover(
     one: &Genome,
     other: &Genome,

@@ -1,4 +1,4 @@
-//! Files: read up to a size limit, and never left half-written.
+//! File access: reading up to a size limit, and writing that never leaves a partial file.
 
 #[cfg(feature = "files")]
 mod write;
@@ -11,7 +11,7 @@ use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-/// A file or folder could not be used.
+/// Error: a file or folder could not be used.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {error}", path.display())]
 pub struct FileError {
@@ -28,20 +28,20 @@ impl FileError {
         move |error| Self { path, error }
     }
 
-    /// The error for a path that exists.
+    /// Creates the error for a path that already exists.
     #[must_use]
     pub fn exists(path: &Path) -> Self {
         let error = io::Error::new(ErrorKind::AlreadyExists, "it already exists");
         Self::at(path)(error)
     }
 
-    /// Returns whether nothing was written because the path exists.
+    /// Checks whether nothing was written because the path exists.
     #[must_use]
     pub fn is_exists(&self) -> bool {
         self.error.kind() == ErrorKind::AlreadyExists
     }
 
-    /// Returns whether another path would work, as opposed to a failure of the system.
+    /// Checks whether a different path could work, as opposed to a failure of the system.
     #[must_use]
     pub fn is_bad_path(&self) -> bool {
         use ErrorKind as Kind;
@@ -61,17 +61,17 @@ impl FileError {
     }
 }
 
-/// What to do if a path exists.
+/// Behaviour if a path already exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Existing {
-    /// Write nothing.
+    /// Keep the existing path and report an error.
     Refuse,
     /// Replace a file, or files with the same names in a folder.
     Replace,
 }
 
 impl Existing {
-    /// From the flag `--overwrite`.
+    /// Converts the flag `--overwrite`.
     #[must_use]
     pub fn with_overwrite(overwrite: bool) -> Self {
         if overwrite {
@@ -82,7 +82,7 @@ impl Existing {
     }
 }
 
-/// The directory that contains a path.
+/// Returns the directory that contains a path.
 #[must_use]
 pub fn parent(path: &Path) -> &Path {
     match path.parent() {
@@ -91,7 +91,7 @@ pub fn parent(path: &Path) -> &Path {
     }
 }
 
-/// Returns whether a path exists, following symbolic links.
+/// Checks whether a path exists, following symbolic links.
 ///
 /// # Errors
 /// [`FileError`] if that cannot be determined, for example without permission to read the folder.
@@ -106,19 +106,19 @@ pub const TEXT_BYTES_MAX: u64 = 16 << 20;
 /// Size limit for files of poses, genomes or generations whose size does not follow from settings.
 pub const DATA_BYTES_MAX: u64 = 256 << 20;
 
-/// A file is larger than its contents can be.
+/// Error: a file exceeds the size limit for its contents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TooLarge {
-    /// Its size is too large.
+    /// The size of the file exceeds the limit.
     #[error("it has {found} bytes; at most {most} are read")]
     Sized {
-        /// Its size.
+        /// The size of the file.
         found: u64,
         /// The size limit.
         most: u64,
     },
-    /// It has no size, such as a pipe, and does not end within the limit.
+    /// The file has no known size, such as a pipe, and does not end within the limit.
     #[error("it does not end within {most} bytes; no more are read")]
     Endless {
         /// The size limit.
@@ -130,14 +130,14 @@ pub enum TooLarge {
 /// spent on a larger file; from a file without a size, no more than the limit is read.
 ///
 /// # Errors
-/// [`FileError`] names the file; its cause is [`TooLarge`] if the file exceeds the limit.
+/// [`FileError`] if the file cannot be read; its cause is [`TooLarge`] if it exceeds the limit.
 pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
     let too_large = |error: TooLarge| io::Error::new(io::ErrorKind::FileTooLarge, error);
     let read = || {
         let file = File::open(path)?;
         let metadata = file.metadata()?;
         let found = metadata.len();
-        // If it is a directory, reading reports that.
+        // Reading a directory reports a clearer error.
         if found > most && !metadata.is_dir() {
             return Err(too_large(TooLarge::Sized { found, most }));
         }
@@ -151,11 +151,10 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
     read().map_err(FileError::at(path))
 }
 
-/// Reads a whole text file of at most `most` bytes, whichever program saved it; see
-/// [`text::decode`].
+/// Reads a whole text file of at most `most` bytes, saved by any program; see [`text::decode`].
 ///
 /// # Errors
-/// [`FileError`] names the file.
+/// [`FileError`] if the file cannot be read, exceeds the limit or is not UTF-8.
 pub fn read_text(path: &Path, most: u64) -> Result<String, FileError> {
     text::decode(&read(path, most)?)
         .map_err(|error| FileError::at(path)(io::Error::new(io::ErrorKind::InvalidData, error)))

@@ -1,4 +1,4 @@
-//! Files that are never half-written: written under a temporary name, synced, then renamed.
+//! Atomic file writes: to a temporary name, synced, then renamed.
 
 use super::{Existing, FileError, parent};
 use sha2::{Digest, Sha256};
@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempPath;
 
-/// The ending of temporary files and directories.
+/// Ending of temporary files and directories.
 const PART: &str = ".part";
 
-/// A temporary name in the same folder, of fixed length: a hash of the final name, and a random
-/// number, because process ids can be the same on two machines that share a file system.
+/// Returns a temporary name in the same folder, of fixed length: a hash of the final name, and a
+/// random number, because two machines that share a file system can have equal process IDs.
 #[must_use]
 pub fn beside(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default();
@@ -23,7 +23,7 @@ pub fn beside(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{hash:016x}.{number:016x}{PART}"))
 }
 
-/// Returns whether a name is a temporary one from [`beside`].
+/// Checks whether a name is a temporary one from [`beside`].
 #[must_use]
 pub fn is_part(name: &OsStr) -> bool {
     let numbers = || {
@@ -35,7 +35,7 @@ pub fn is_part(name: &OsStr) -> bool {
     numbers().is_some_and(|(hash, number)| is_number(hash) && is_number(number))
 }
 
-/// No write takes longer than this.
+/// Maximum age of a temporary file in use: no write takes longer than this.
 const PART_AGE_MAX: Duration = Duration::from_secs(3600);
 
 /// Removes the temporary files that killed processes left in a folder.
@@ -46,7 +46,7 @@ pub fn remove_old_parts(folder: &Path) {
             Some(metadata.is_file() && age > PART_AGE_MAX)
         };
         if is_part(&entry.file_name()) && entry.metadata().ok().and_then(is_old) == Some(true) {
-            // Cosmetic: failure to remove it is ignored.
+            // Cosmetic: failure to remove the file is ignored.
             let _ = fs::remove_file(entry.path());
         }
     }
@@ -55,7 +55,7 @@ pub fn remove_old_parts(folder: &Path) {
 /// Writes a file, replacing an existing one only if `existing` allows it.
 ///
 /// # Errors
-/// As [`create`] and [`replace`].
+/// Those of [`create`] or [`replace`].
 pub fn write(path: &Path, contents: &[u8], existing: Existing) -> Result<(), FileError> {
     match existing {
         Existing::Refuse => create(path, contents),
@@ -63,12 +63,13 @@ pub fn write(path: &Path, contents: &[u8], existing: Existing) -> Result<(), Fil
     }
 }
 
-/// Writes a file that must not exist yet. It appears under its name complete, and replaces nothing,
-/// not even a file created in the meantime. On a file system with neither hard links nor a rename
-/// that refuses to replace, an empty file briefly reserves the name.
+/// Writes a file that must not exist yet. The file appears under its name only when complete, and
+/// replaces nothing, not even a file created in the meantime. On a file system with neither hard
+/// links nor a rename that fails if the target exists, an empty file briefly reserves the name.
 ///
 /// # Errors
-/// [`FileError`] if it exists ([`FileError::is_exists`]) or cannot be written; nothing is left.
+/// [`FileError`] if the file exists ([`FileError::is_exists`]) or cannot be written; no partial
+/// file is left.
 pub fn create(path: &Path, contents: &[u8]) -> Result<(), FileError> {
     if path.symlink_metadata().is_ok() {
         return Err(FileError::exists(path));
@@ -83,7 +84,7 @@ pub fn create(path: &Path, contents: &[u8]) -> Result<(), FileError> {
         };
         File::create_new(path)?;
         refused.path.persist(path).map_err(|refused| {
-            // The file is empty and ours; the first error is the one to report.
+            // This process created the empty file; the first error is the one to report.
             let _ = fs::remove_file(path);
             refused.error
         })
@@ -92,11 +93,11 @@ pub fn create(path: &Path, contents: &[u8]) -> Result<(), FileError> {
 }
 
 /// Replaces a file as a whole: if the process is killed, either the old or the new file exists. The
-/// new one gets the permissions of the old one. A symbolic link is kept, and its target replaced.
-/// What cannot be replaced (a device, a pipe, a mounted file) is written to instead.
+/// new one gets the permissions of the old one. A symbolic link is kept, and its target replaced. A
+/// target that cannot be replaced (a device, a pipe, a mounted file) is written in place.
 ///
 /// # Errors
-/// [`FileError`] if it cannot be written; the old file is then unchanged.
+/// [`FileError`] if the file cannot be written; the old file is then unchanged.
 pub fn replace(path: &Path, contents: &[u8]) -> Result<(), FileError> {
     let replace = || {
         let old = fs::metadata(path).ok();
@@ -119,7 +120,7 @@ pub fn replace(path: &Path, contents: &[u8]) -> Result<(), FileError> {
     replace().map_err(FileError::at(path))
 }
 
-/// Writes a temporary file beside a path; it is removed unless it is renamed.
+/// Writes a temporary file beside a path; the file is removed unless it is renamed.
 fn write_beside(
     path: &Path,
     contents: &[u8],
@@ -144,17 +145,17 @@ fn write_to(path: &Path, contents: &[u8]) -> io::Result<()> {
     file.write_all(contents)
 }
 
-/// The target of a chain of symbolic links, whether it exists or not.
+/// Returns the target of a chain of symbolic links, whether or not it exists.
 fn target(path: &Path) -> io::Result<PathBuf> {
     let mut target = path.to_owned();
-    // As many links as Linux follows.
+    // The maximum number of links that Linux follows.
     for _ in 0..40 {
         match fs::read_link(&target) {
             Ok(next) => target = parent(&target).join(next),
             Err(_) => return Ok(target),
         }
     }
-    // A loop: using it reports the error.
+    // The links form a loop: using the path reports the error.
     fs::metadata(path).map(|_| target)
 }
 
@@ -237,7 +238,7 @@ mod tests {
         symlink("folder/second", at("first")).unwrap();
         symlink("../file", at("folder/second")).unwrap();
         for contents in [b"new".as_slice(), b"newer"] {
-            // The first time there is nothing at the end.
+            // In the first round, the link's target does not exist.
             replace(&at("first"), contents).unwrap();
             assert_eq!(fs::read(at("file")).unwrap(), contents);
         }

@@ -1,9 +1,10 @@
-//! What this machine has.
+//! Memory and disk space of this machine.
 
 use std::path::Path;
 use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System};
 
-/// Memory that this process can still get: of the machine, of its cgroup, of its address space.
+/// Returns the memory that this process can still allocate: the minimum of the machine's, its
+/// cgroup's and its address space's.
 pub(super) fn memory_available() -> Option<u64> {
     let mut system = System::new().ok()?;
     system.refresh_memory();
@@ -34,8 +35,8 @@ fn address_space_max() -> Option<u64> {
     None
 }
 
-/// Free bytes of the disk that a path is on; of its first ancestor that there is, if it is to be
-/// made.
+/// Returns the free bytes of the disk that holds a path; if the path does not exist, of the disk
+/// that holds its nearest existing ancestor.
 pub(super) fn disk_available(path: &Path) -> Option<u64> {
     let absolute = std::path::absolute(path).ok()?;
     let existing = absolute.ancestors().find(|path| path.exists())?;

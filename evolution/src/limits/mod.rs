@@ -1,8 +1,9 @@
-//! What a command takes of this machine, estimated from its settings before anything is allocated
-//! or written, and refused where there is less.
+//! Memory and disk that a command needs, estimated from its settings before anything is allocated
+//! or written. A command that needs more than is available is rejected.
 //!
-//! Estimates are of the peak, and right within a factor of two from some ten megabytes on: the test
-//! `limits` measures it. Where the system does not tell what there is, nothing is refused.
+//! Estimates are of the peak and, above some ten megabytes, right within a factor of two; the test
+//! `limits` measures this. If the system does not report how much is available, no command is
+//! rejected.
 
 #[cfg(feature = "files")]
 mod machine;
@@ -18,12 +19,12 @@ use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use unit_prefix::NumberPrefix;
 
-/// Least that is announced before it is used, in bytes.
+/// Smallest need that is reported before a command starts, in bytes.
 const WORTH_SAYING: f64 = 1e9;
-/// Files take whole blocks of a disk.
+/// Block size of a disk, in bytes: files occupy whole blocks.
 const BLOCK_BYTES: f64 = 4096.0;
 
-/// A command needs more than this machine has.
+/// Error: a command needs more than this machine has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{setting}: too much for this machine: about {} of {} would be needed, {} of it for {what}; {} \
@@ -33,24 +34,24 @@ const BLOCK_BYTES: f64 = 4096.0;
 pub struct TooMuch {
     /// The settings to change.
     pub setting: String,
-    /// What takes most.
+    /// The largest part of the need.
     pub what: &'static str,
-    /// Bytes that takes.
+    /// Size of that part, in bytes.
     pub part: u64,
-    /// Bytes estimated, of everything.
+    /// Total estimated need, in bytes.
     pub needed: u64,
-    /// Bytes there are.
+    /// Available bytes.
     pub available: u64,
-    /// Of what.
+    /// Memory or disk where the bytes are needed.
     pub place: Place,
 }
 
-/// Where bytes are.
+/// Memory or a disk.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// In memory.
+    /// Memory.
     Memory,
-    /// On the disk that holds, or will hold, this directory.
+    /// The disk that holds, or will hold, this directory.
     Disk(PathBuf),
 }
 
@@ -62,7 +63,7 @@ impl Place {
         }
     }
 
-    /// How the available bytes are described.
+    /// Describes the available bytes.
     fn rest(&self) -> String {
         match self {
             Self::Memory => "available".to_owned(),
@@ -78,30 +79,30 @@ impl Place {
     }
 }
 
-/// Something that takes memory or disk.
+/// Part of the memory or disk that a command needs.
 #[derive(Clone, Debug)]
 struct Part {
     bytes: f64,
     what: &'static str,
-    /// The settings that it grows with.
+    /// The settings that determine its size.
     setting: String,
 }
 
-/// What a command takes at most at any moment.
+/// Peak memory and disk use of a command.
 #[derive(Clone, Debug, Default)]
 pub struct Needs {
     memory: Vec<Part>,
     disk: Vec<Part>,
 }
 
-/// Number of threads, by default one per core.
+/// Returns the number of threads, by default one per core.
 #[must_use]
 pub fn threads(given: Option<u32>) -> f64 {
     let cores = || std::thread::available_parallelism().map_or(1, NonZero::get);
     given.map_or_else(|| cores() as f64, f64::from)
 }
 
-/// Bytes in the unit that suits them.
+/// Formats a number of bytes with a decimal unit.
 fn decimal_bytes(bytes: u64) -> String {
     match NumberPrefix::decimal(bytes as f64) {
         NumberPrefix::Standalone(bytes) => format!("{bytes:.0} B"),
@@ -109,28 +110,28 @@ fn decimal_bytes(bytes: u64) -> String {
     }
 }
 
-/// Size of a type, in bytes.
+/// Returns the size of a type in bytes.
 const fn size<T>() -> f64 {
     size_of::<T>() as f64
 }
 
 impl Needs {
-    /// An evolution and its run directory.
+    /// Estimates an evolution and its run directory.
     #[must_use]
     pub fn of_evolution(settings: &Settings, threads: f64) -> Self {
         let scenario = settings.scenario();
-        // One evaluates a genome at a time, or half of its repetitions.
+        // A thread evaluates one genome at a time, or half of its repetitions.
         let tasks = u64::from(settings.population()) * u64::from(settings.repetitions().min(2));
         let threads = threads.min(tasks as f64);
         let population = f64::from(settings.population());
         let repetitions = f64::from(settings.repetitions());
         let checkpoint = checkpoint_bytes(settings);
-        // Two generations, and a checkpoint that is being written.
+        // Two generations and the checkpoint being written.
         let genomes = population * 2.0 * size::<Genome>() + checkpoint;
-        // All trials, their copy in the set that is evaluated, and in halves if there is no noise.
+        // All trials, their copy in the trial set and, without noise, a copy split into halves.
         let copies = if scenario.noise().is_none() { 3.0 } else { 2.0 };
         let trials = repetitions * copies * trial_bytes(scenario);
-        // In memory and as they are packed into the checkpoint, and the table's text.
+        // In memory, in the checkpoint, and in the text of the table.
         let records = 2.0 * (size::<GenerationRecord>() + 32.0) + 64.0;
         let history = f64::from(settings.generations()) * records + 2.0 * table_bytes(settings);
         let [robots, cells, steps] = world(scenario);
@@ -165,7 +166,7 @@ impl Needs {
                     setting: format!("grid = {}", scenario.grid()),
                 },
                 part(
-                    // Of every step a few numbers, which are also in final.json.
+                    // A few numbers per step, which are also in final.json.
                     steps * (60.0 + 1.5 * STEP_TEXT_BYTES) + threads * evaluator(scenario),
                     "the steps",
                     [("steps", scenario.steps())],
@@ -191,7 +192,7 @@ impl Needs {
         }
     }
 
-    /// A genome from new starts, whose outcomes are kept.
+    /// Estimates the evaluation of a genome from new starts, with all outcomes kept.
     #[must_use]
     pub fn of_starts<T>(
         scenarios: &[(Scenario, T)],
@@ -199,7 +200,7 @@ impl Needs {
         threads: f64,
     ) -> Self {
         let mut memory = Vec::new();
-        // Which is used for one scenario after the other.
+        // The scenarios are evaluated one after the other, so only the largest world counts.
         let mut worlds = Vec::new();
         for (scenario, _) in scenarios {
             let [robots, cells, _] = world(scenario);
@@ -222,12 +223,12 @@ impl Needs {
         }
     }
 
-    /// A run of which every state is kept.
+    /// Estimates a run with every state kept.
     #[must_use]
     pub fn of_recording(scenario: &Scenario) -> Self {
         let [robots, cells, steps] = world(scenario);
         let robot_step = size::<Pose>() + size::<SensorBits>() + size::<Decision>() + 1.0;
-        // Each of the four is a vector of its own; then the measures of the step.
+        // Four separate vectors per step, and the measures of the step.
         let step = size::<TraceStep>() + size::<Vec<u8>>() + 4.0 * 16.0 + 48.0;
         Self {
             memory: vec![
@@ -242,7 +243,7 @@ impl Needs {
         }
     }
 
-    /// A run of which every state is kept, and written as the authors' text.
+    /// Estimates a run with every state kept and exported as text in the authors' format.
     #[must_use]
     pub fn of_trajectory(scenario: &Scenario) -> Self {
         let mut needs = Self::of_recording(scenario);
@@ -250,7 +251,7 @@ impl Needs {
         let digits = |number: f64| number.max(1.0).log10().floor() + 1.0;
         let grid = scenario.grid();
         let place = digits(grid.width().into()) + digits(grid.height().into());
-        // The step, the place, the heading, and what is between them.
+        // The step, the cell, the heading and the separators.
         let line = digits(steps) + place + 11.0;
         let text = part(
             (steps + 1.0) * robots * line,
@@ -262,7 +263,7 @@ impl Needs {
         needs
     }
 
-    /// The same, this many times at once.
+    /// Multiplies the estimate, for several copies at once.
     #[must_use]
     pub fn times(mut self, number: f64) -> Self {
         for part in self.memory.iter_mut().chain(&mut self.disk) {
@@ -271,7 +272,8 @@ impl Needs {
         self
     }
 
-    /// A run with a robot in it: what robot 0 decides, there and in the simulation.
+    /// Estimates a hardware-in-the-loop run: the decisions of robot 0, on the robot and in
+    /// simulation.
     #[must_use]
     pub fn of_hil(scenario: &Scenario) -> Self {
         let [robots, cells, steps] = world(scenario);
@@ -283,13 +285,13 @@ impl Needs {
         }
     }
 
-    /// Bytes of memory.
+    /// Returns the bytes of memory.
     #[must_use]
     pub fn memory(&self) -> f64 {
         total(&self.memory)
     }
 
-    /// Bytes of disk.
+    /// Returns the bytes of disk.
     #[must_use]
     pub fn disk(&self) -> f64 {
         total(&self.disk)
@@ -298,7 +300,7 @@ impl Needs {
     /// Checks that there is enough memory.
     ///
     /// # Errors
-    /// [`TooMuch`] names the settings to change.
+    /// [`TooMuch`] if there is not; the message names the settings to change.
     pub fn check_memory(&self) -> Result<(), TooMuch> {
         check(&self.memory, Place::Memory)
     }
@@ -306,12 +308,12 @@ impl Needs {
     /// Checks that there is enough space on the disk of a directory, which need not exist.
     ///
     /// # Errors
-    /// [`TooMuch`] names the settings to change.
+    /// [`TooMuch`] if there is not; the message names the settings to change.
     pub fn check_disk(&self, directory: &Path) -> Result<(), TooMuch> {
         check(&self.disk, Place::Disk(directory.to_owned()))
     }
 
-    /// A line for who would be surprised by what is going to be used; none if that is little.
+    /// Describes a need large enough to surprise users; returns `None` if it is small.
     #[must_use]
     pub fn announcement(&self) -> Option<String> {
         let [memory, disk] = [self.memory(), self.disk()];
@@ -322,13 +324,13 @@ impl Needs {
     }
 }
 
-/// What runs take that are done one after the other.
+/// Memory and disk needed by runs that are done one after the other.
 #[derive(Clone, Debug, Default)]
 pub struct NeedsOfRuns {
-    /// Of memory, and of disk until it is complete, what the largest run takes.
+    /// Largest run: its memory, and its disk until it is complete.
     largest: Needs,
     runs: u64,
-    /// Bytes of disk that all leave, and the largest.
+    /// Bytes of disk that complete runs keep: of all runs, and of the largest.
     left: f64,
     left_most: f64,
 }
@@ -351,7 +353,7 @@ impl NeedsOfRuns {
         };
     }
 
-    /// Returns the memory and disk they need.
+    /// Returns the memory and disk that the runs need.
     #[must_use]
     pub fn needs(&self) -> Needs {
         let mut needs = self.largest.clone();
@@ -359,7 +361,7 @@ impl NeedsOfRuns {
         needs
     }
 
-    /// The least disk they need if this many of them are done.
+    /// Returns the least disk that the runs need once `done` of them are complete.
     #[must_use]
     pub fn at_least_without(&self, done: u64) -> Needs {
         let left = (self.left - done as f64 * self.left_most).max(0.0);
@@ -378,7 +380,7 @@ impl NeedsOfRuns {
     }
 }
 
-/// Checks that all parts fit.
+/// Checks that the sum of all parts is available.
 fn check(parts: &[Part], place: Place) -> Result<(), TooMuch> {
     let needed = total(parts) as u64;
     match (
@@ -397,7 +399,7 @@ fn check(parts: &[Part], place: Place) -> Result<(), TooMuch> {
     }
 }
 
-/// Robots on their grid.
+/// Estimates the robots on their grid.
 fn swarm(scenario: &Scenario, bytes: f64) -> Part {
     let (robots, grid) = (scenario.robots(), scenario.grid());
     Part {
@@ -432,28 +434,30 @@ fn by_bytes(one: &Part, other: &Part) -> Ordering {
     one.bytes.total_cmp(&other.bytes)
 }
 
-/// Robots, cells and steps.
+/// Returns the numbers of robots, cells and steps.
 fn world(scenario: &Scenario) -> [f64; 3] {
     [scenario.robots(), scenario.grid().cells(), scenario.steps()].map(f64::from)
 }
 
-/// Of a robot in the world, and in the measures of a run.
+/// Bytes per robot in the plain world and in the measures of a run.
 const ROBOT_BYTES: f64 = size::<State>() + 4.0 * size::<Pose>() + 8.0;
 
-/// Of a robot in the fast engine, for each thread: its swarm, its lane, and a part of the recording.
+/// Returns the bytes per robot and thread in the fast engine: swarm, lane, and a part of the
+/// recording.
 fn swarm_bytes(scenario: &Scenario) -> f64 {
     let blocks = scenario.steps().div_ceil(4).min(4);
     60.0 + 8.0 * f64::from(blocks)
 }
 
-/// Bytes of a step in `final.json`: temperature and surprise, a line each.
+/// Bytes per step in `final.json`: temperature and surprise, one line each.
 const STEP_TEXT_BYTES: f64 = 45.0;
 
 fn trial_bytes(scenario: &Scenario) -> f64 {
     size::<Trial>() + f64::from(scenario.robots()) * size::<Pose>()
 }
 
-/// Noise that is kept for all genomes of a generation: nothing beyond 8 MB a repetition.
+/// Returns the bytes of noise kept for all genomes of a generation; 0 if that exceeds 8 MB per
+/// repetition.
 fn flips(scenario: &Scenario) -> f64 {
     let [robots, _, steps] = world(scenario);
     let bytes = 2.0 * robots * steps;
@@ -464,34 +468,36 @@ fn flips(scenario: &Scenario) -> f64 {
     }
 }
 
-/// What the fast engine keeps of a few repetitions of a small swarm: at most 12 MB a thread.
+/// Returns the bytes that the fast engine keeps for a few repetitions of a small swarm: at most 12
+/// MB per thread.
 fn evaluator(scenario: &Scenario) -> f64 {
     let [robots, _, steps] = world(scenario);
     (3.0 * robots * steps).min(12e6)
 }
 
-/// Bytes of a checkpoint.
+/// Estimates the size of a checkpoint, in bytes.
 #[must_use]
 pub fn checkpoint_bytes(settings: &Settings) -> f64 {
-    // Most weights take two bytes.
+    // Most weights take two bytes when encoded.
     let genome = 2.1 * settings.topology().weights() as f64 + 2.0;
     f64::from(settings.population()) * genome + f64::from(settings.generations()) * 70.0
 }
 
-/// Maximum number of bytes read from a file with this estimate.
+/// Returns the maximum number of bytes to read from a file with this estimated size.
 #[must_use]
 pub fn most(estimate: f64) -> u64 {
-    // As no estimate is off by more than a factor of two; small files have a head.
+    // Estimates are right within a factor of two; the constant covers the fixed parts of small
+    // files.
     (2.0 * estimate) as u64 + TEXT_BYTES_MAX
 }
 
-/// Bytes of `generations.csv`.
+/// Estimates the size of `generations.csv`, in bytes.
 #[must_use]
 pub fn table_bytes(settings: &Settings) -> f64 {
     f64::from(settings.generations()) * 140.0
 }
 
-/// Bytes of `final.json`.
+/// Estimates the size of `final.json`, in bytes.
 #[must_use]
 pub fn final_state_bytes(settings: &Settings) -> f64 {
     let scenario = settings.scenario();
@@ -500,10 +506,10 @@ pub fn final_state_bytes(settings: &Settings) -> f64 {
     1500.0 + 2.0 * robots * (6.0 + digits) + steps * STEP_TEXT_BYTES
 }
 
-/// Bytes of the directory of a complete run.
+/// Estimates the size of a complete run's directory, in bytes.
 fn finished_bytes(settings: &Settings) -> f64 {
     let files = [final_state_bytes(settings), table_bytes(settings)];
-    // The others, and the directory itself, take a block each.
+    // The other files and the directory itself take one block each.
     files
         .map(|bytes| (bytes / BLOCK_BYTES).ceil())
         .iter()
@@ -512,7 +518,7 @@ fn finished_bytes(settings: &Settings) -> f64 {
         + 6.0 * BLOCK_BYTES
 }
 
-/// Without an operating system to ask, nothing is refused.
+/// Without an operating system to query, no command is rejected.
 #[cfg(not(feature = "files"))]
 mod machine {
     use std::path::Path;

@@ -1,5 +1,5 @@
-//! Settings of an evolution: from a TOML file and flags of the same names, or from a program;
-//! checked, and written back in full.
+//! Settings of an evolution, from a TOML file, flags of the same names or a program: checked, and
+//! written back in full.
 
 mod overrides;
 mod table;
@@ -21,40 +21,40 @@ use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
 use table::Values;
 
-/// A setting that cannot be used.
+/// Error: a setting cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SettingError {
     /// The value is not valid.
     #[error("{place} = {value}: {problem}")]
     Invalid {
-        /// Where it was given.
+        /// Place where it was given.
         place: Place,
-        /// What was given.
+        /// The given value.
         value: String,
-        /// What is wrong and what would be valid.
+        /// Description of the problem and of valid values.
         problem: String,
     },
     /// Two settings exclude each other.
     #[error("{first} and {second} exclude each other")]
     Conflict {
-        /// Where the one was given.
+        /// Place of one setting.
         first: Place,
-        /// Where the other was given.
+        /// Place of the other setting.
         second: Place,
     },
     /// No setting has this name.
     #[error("{place} is not a setting; settings are {}", names())]
     UnknownKey {
-        /// Where it was given.
+        /// Place where it was given.
         place: Place,
     },
-    /// The file is not TOML.
+    /// The file is not valid TOML.
     #[error("{}: {error}", path.display())]
     Toml {
         /// The file.
         path: PathBuf,
-        /// What is wrong, with its place.
+        /// The error, with its position.
         error: Box<toml::de::Error>,
     },
     /// The file cannot be read.
@@ -62,13 +62,13 @@ pub enum SettingError {
     Unreadable(#[from] FileError),
 }
 
-/// Names of all settings.
+/// Returns the names of all settings.
 fn names() -> String {
     let names: Vec<&str> = SETTINGS.iter().map(|setting| setting.name).collect();
     names.join(", ")
 }
 
-/// Checked settings of an evolution: all that its result depends on.
+/// Checked settings of an evolution: everything that its result depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     values: Values,
@@ -78,14 +78,16 @@ pub struct Settings {
     ancestor: Option<Genome>,
 }
 
-/// A problem with one of these settings: the first that was given, or the first.
+/// A problem with one of these settings. It is attributed to the first that was given, or to the
+/// first in the list if none was.
 type Problem = (&'static [&'static str], String);
 
 impl SettingsBuilder {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`SettingError`] names the setting, the value and what would be valid.
+    /// [`SettingError`] if a setting is invalid; the message names the setting, the value and what
+    /// would be valid.
     pub fn build(self) -> Result<Settings, SettingError> {
         let mut values = self.0;
         let seed = values.seed.unwrap_or(0);
@@ -101,16 +103,17 @@ impl SettingsBuilder {
 }
 
 impl Settings {
-    /// Settings to be made by a program.
+    /// Returns a builder for settings made by a program.
     #[must_use]
     pub fn builder() -> SettingsBuilder {
         SettingsBuilder::default()
     }
 
-    /// Checks everything that was given and fills in the paper's defaults (Tab. 3).
+    /// Checks all given values and fills in the paper's defaults (Tab. 3).
     ///
     /// # Errors
-    /// [`SettingError`] names the place, the value and what would be valid.
+    /// [`SettingError`] if a setting is invalid; the message names the place, the value and what
+    /// would be valid.
     pub fn resolve(
         overrides: &Overrides,
         draw_seed: impl FnOnce() -> u64,
@@ -121,95 +124,95 @@ impl Settings {
         checked(values).map_err(|(keys, problem)| overrides.invalid(keys, problem))
     }
 
-    /// Sensor model and predictions.
+    /// Returns the sensor model and the predictions.
     #[must_use]
     pub fn topology(&self) -> Topology {
         self.topology
     }
 
-    /// Grid, swarm size, evaluation length, noise.
+    /// Returns the grid, swarm size, evaluation length and noise.
     #[must_use]
     pub fn scenario(&self) -> &Scenario {
         &self.scenario
     }
 
-    /// Genomes per generation.
+    /// Returns the number of genomes per generation.
     #[must_use]
     pub fn population(&self) -> u32 {
         self.values.population
     }
 
-    /// Generations.
+    /// Returns the number of generations.
     #[must_use]
     pub fn generations(&self) -> u32 {
         self.values.generations
     }
 
-    /// Repetitions per evaluation.
+    /// Returns the number of repetitions per evaluation.
     #[must_use]
     pub fn repetitions(&self) -> u32 {
         self.values.repetitions
     }
 
-    /// Probability that a sensor bit is flipped, as it was given.
+    /// Returns the given probability that a sensor bit is flipped.
     #[must_use]
     pub fn noise(&self) -> f64 {
         self.values.noise
     }
 
-    /// Probability that a weight mutates, as it was given.
+    /// Returns the given probability that a weight mutates.
     #[must_use]
     pub fn mutation(&self) -> f64 {
         self.values.mutation.unwrap_or(DEFAULT_MUTATION)
     }
 
-    /// How the next generation is made.
+    /// Returns the rules for creating the next generation.
     #[must_use]
     pub fn variation(&self) -> Variation {
         self.variation
     }
 
-    /// Root of all random streams.
+    /// Returns the root of all random streams.
     #[must_use]
     pub fn seed(&self) -> u64 {
         self.values.seed.unwrap_or(0)
     }
 
-    /// The same with another seed.
+    /// Returns these settings with a different seed.
     #[must_use]
     pub fn with_seed(mut self, seed: u64) -> Self {
         self.values.seed = Some(seed);
         self
     }
 
-    /// A genome whose mutants are the first population.
+    /// Returns the genome whose mutants form the first population.
     #[must_use]
     pub fn ancestor(&self) -> Option<&Genome> {
         self.ancestor.as_ref()
     }
 
-    /// The settings as `config.toml` holds them, by name: all that the result depends on.
+    /// Returns the settings in `config.toml`, by name: everything that the result depends on.
     pub fn config(&self) -> impl Iterator<Item = (&'static str, Scalar)> {
         let values = |setting: &Setting| Some((setting.name, (setting.get)(&self.values)?));
         SETTINGS.iter().filter_map(values)
     }
 
-    /// The value of a setting as `config.toml` holds it.
+    /// Returns the value of a setting in `config.toml`.
     #[must_use]
     pub fn value(&self, name: &str) -> Option<Scalar> {
         (setting(name)?.get)(&self.values)
     }
 
-    /// The text of `config.toml`.
+    /// Formats the settings as `config.toml`.
     ///
     /// # Panics
-    /// Does not: TOML holds any number and text.
+    /// Never: TOML can represent any number and text.
     #[must_use]
     pub fn toml(&self) -> String {
         toml::to_string(&Config(self)).expect("plain numbers and strings")
     }
 
-    /// A name for the run: model, predictions, grid, seed.
+    /// Returns a name for the run: model, predictions, grid, seed.
     #[must_use]
     pub fn run_name(&self) -> String {
         let predictions = match self.topology.prediction() {
@@ -222,7 +225,7 @@ impl Settings {
         format!("{model}-{predictions}-{grid}-seed-{seed}")
     }
 
-    /// Robot-steps of one generation.
+    /// Returns the number of robot-steps per generation.
     #[must_use]
     pub fn robot_steps_per_generation(&self) -> u64 {
         u64::from(self.population())
@@ -231,7 +234,7 @@ impl Settings {
             .saturating_mul(self.scenario.robots().into())
     }
 
-    /// Robot-steps of the whole evolution.
+    /// Returns the number of robot-steps of the whole evolution.
     #[must_use]
     pub fn robot_steps(&self) -> u64 {
         let generations = u64::from(self.generations());
@@ -239,14 +242,15 @@ impl Settings {
             .saturating_mul(generations)
     }
 
-    /// Bits scored in one repetition: a fitness is a number of matches over this.
+    /// Returns the number of bits scored in one repetition, by which matches are divided to give
+    /// the fitness.
     #[must_use]
     pub fn scored_bits(&self) -> u64 {
         self.scenario.scored_bits(self.topology.sensors())
     }
 }
 
-/// What `config.toml` holds.
+/// The contents of `config.toml`.
 struct Config<'a>(&'a Settings);
 
 impl Serialize for Config<'_> {
@@ -257,7 +261,7 @@ impl Serialize for Config<'_> {
 
 const DEFAULT_MUTATION: f64 = 0.1;
 
-/// Checks values that are valid by themselves against each other.
+/// Checks individually valid values for consistency with each other.
 fn checked(mut values: Values) -> Result<Settings, Problem> {
     let topology = topology(&values)?;
     let noise = NoiseRate::new(values.noise)
@@ -301,7 +305,7 @@ fn checked(mut values: Values) -> Result<Settings, Problem> {
     })
 }
 
-/// The topology that the settings ask for.
+/// Returns the topology selected by the settings.
 fn topology(values: &Values) -> Result<Topology, Problem> {
     let (key, prediction): (&[_], _) = match (values.predefine, values.predefine_partly) {
         (None, None) => (&["predefine"], Prediction::Free),
@@ -320,7 +324,7 @@ fn topology(values: &Values) -> Result<Topology, Problem> {
     Topology::new(values.sensor_model, prediction).map_err(|error| (key, error.to_string()))
 }
 
-/// A genome file for a topology.
+/// Reads a genome file and checks its topology.
 fn read_genome_for(path: &Path, topology: Topology) -> Result<Genome, String> {
     let file = GenomeFile::read(path).map_err(|error| error.problem())?;
     if file.topology() == topology {

@@ -1,6 +1,6 @@
-//! Settings as they are given: by flags and in TOML files.
+//! Settings as given by flags and in TOML files.
 //!
-//! Every value keeps the place where it was given, so that an error can name it.
+//! Every value keeps the place where it was given, so that errors can show the place.
 
 use super::table::{SETTINGS, Values};
 use super::{SettingError, Settings};
@@ -10,14 +10,14 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Where a setting was given.
+/// Place where a setting was given.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// On the command line.
+    /// A flag on the command line.
     Flag(&'static str),
-    /// In a program.
+    /// A method call in a program.
     Builder(&'static str),
-    /// In a file.
+    /// A line of a file.
     Line {
         /// The file.
         path: PathBuf,
@@ -47,7 +47,7 @@ pub struct Overrides {
 }
 
 impl Overrides {
-    /// Adds a flag's value, if it was given.
+    /// Adds a flag's value if it was given.
     pub fn flag(&mut self, key: &'static str, value: Option<&str>) {
         if let Some(value) = value {
             let place = Place::Flag(key);
@@ -63,10 +63,10 @@ impl Overrides {
         self.text(path, &files::read_text(path, TEXT_BYTES_MAX)?)
     }
 
-    /// Adds the values of a TOML text, except those already given; the path is for errors.
+    /// Adds the values of a TOML text, except those already given; the path is used in errors.
     ///
     /// # Errors
-    /// [`SettingError`] if it is not TOML, or has unknown keys.
+    /// [`SettingError`] if the text is not TOML, or has unknown keys.
     pub fn text(&mut self, path: &Path, text: &str) -> Result<(), SettingError> {
         let table = toml::de::DeTable::parse(text).map_err(|error| SettingError::Toml {
             path: path.to_owned(),
@@ -93,7 +93,7 @@ impl Overrides {
         Ok(())
     }
 
-    /// The first setting that every `config.toml` of a run holds and that was not given.
+    /// Returns the first missing setting of those that every run's `config.toml` contains.
     #[must_use]
     pub fn missing(&self) -> Option<&'static str> {
         let defaults = Settings::resolve(&Self::default(), || 0).ok()?;
@@ -106,37 +106,37 @@ impl Overrides {
         self.values.remove(key);
     }
 
-    /// Returns where a setting was given; none if it was not.
+    /// Returns the place where a setting was given; `None` if it was not.
     #[must_use]
     pub fn place(&self, key: &str) -> Option<&Place> {
         self.values.get(key).map(|(_, place)| place)
     }
 
-    /// The number of threads, if one was given.
+    /// Returns the number of threads, if given.
     ///
     /// # Errors
-    /// [`SettingError`] if any value is not valid.
+    /// [`SettingError`] if any value is invalid.
     pub fn threads(&self) -> Result<Option<u32>, SettingError> {
         Ok(self.values()?.threads)
     }
 
-    /// The run directory, if one was given.
+    /// Returns the run directory, if given.
     ///
     /// # Errors
-    /// [`SettingError`] if any value is not valid.
+    /// [`SettingError`] if any value is invalid.
     pub fn out(&self) -> Result<Option<PathBuf>, SettingError> {
         Ok(self.values()?.out)
     }
 
-    /// The topology that the values ask for.
+    /// Returns the topology selected by the values.
     ///
     /// # Errors
-    /// [`SettingError`] if there is none.
+    /// [`SettingError`] if the values select no valid topology.
     pub fn topology(&self) -> Result<Topology, SettingError> {
         super::topology(&self.values()?).map_err(|(keys, problem)| self.invalid(keys, problem))
     }
 
-    /// The values, over the defaults.
+    /// Returns the given values, and defaults for the others.
     pub(super) fn values(&self) -> Result<Values, SettingError> {
         let mut values = Values::default();
         for setting in SETTINGS {
@@ -154,7 +154,8 @@ impl Overrides {
         }
     }
 
-    /// An error about the first of these settings that was given, or the default of the first.
+    /// Creates an error about the first of these settings that was given; if none was, about the
+    /// default of the first.
     pub(super) fn invalid(&self, keys: &[&'static str], problem: String) -> SettingError {
         let mut given = keys.iter().filter_map(|key| self.values.get(key).cloned());
         let default = || ("(default)".to_owned(), Place::Flag(keys[0]));
@@ -167,7 +168,7 @@ impl Overrides {
     }
 }
 
-/// A string as it stands; a number without its underscores.
+/// Returns a string unchanged, or a number without its underscores.
 fn scalar_text(value: &toml::de::DeValue<'_>) -> Result<String, &'static str> {
     if let Some(text) = value.as_str() {
         Ok(text.to_owned())

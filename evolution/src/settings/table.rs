@@ -1,6 +1,6 @@
-//! The table of settings: everything there is to know of one is its entry here.
+//! The table of settings, which defines each setting in one entry.
 //!
-//! Flags and their help, keys of files, lists of suites, documents and errors are made from it.
+//! The table generates flags, their help, keys of files, lists of suites, documents and errors.
 
 use super::values::{
     COUNT_MAX, THREADS_MAX, count, grid, model, model_name, probability, seed, template,
@@ -18,13 +18,13 @@ use std::path::PathBuf;
 pub struct Setting {
     /// Name in files, and as a flag with `--` before it.
     pub name: &'static str,
-    /// What a value is called in help texts.
+    /// Name of the value in help texts.
     pub value_name: &'static str,
-    /// Whether a value is the path of a file or directory.
+    /// True if a value is the path of a file or directory.
     pub is_path: bool,
-    /// Default, as it would be typed or in words; empty if there is none.
+    /// Default, as typed on the command line or described in words; empty if the setting has none.
     pub default: &'static str,
-    /// What is valid.
+    /// Description of valid values.
     pub valid: &'static str,
     /// Key of its list of values in a suite; empty if a suite has no such list.
     pub list: &'static str,
@@ -34,27 +34,27 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// Returns what the setting means, as a sentence without its full stop.
+    /// Returns the meaning of the setting, as a sentence without its full stop.
     #[must_use]
     pub fn meaning(&self) -> &'static str {
         self.meaning.trim().trim_end_matches('.')
     }
 }
 
-/// The setting of this name.
+/// Returns the setting with this name.
 #[must_use]
 pub fn setting(name: &str) -> Option<&'static Setting> {
     SETTINGS.iter().find(|setting| setting.name == name)
 }
 
-/// A value as files hold it.
+/// A value in the form stored in files.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Scalar {
     /// Text.
     Text(String),
     /// A whole number.
     Integer(u64),
-    /// Another number.
+    /// A number with a fraction.
     Float(f64),
 }
 
@@ -108,7 +108,8 @@ impl std::fmt::Display for Scalar {
     }
 }
 
-/// From each entry: a field of [`Values`], a method of [`SettingsBuilder`], a row of [`SETTINGS`].
+/// Generates, for each entry, a field of [`Values`], a method of [`SettingsBuilder`] and a row of
+/// [`SETTINGS`].
 macro_rules! settings {
     ($(
         $(#[doc = $meaning:literal])+
@@ -118,7 +119,7 @@ macro_rules! settings {
         parse $parse:expr,
         write $write:expr;
     )+) => {
-        /// A value of every setting.
+        /// The values of all settings.
         #[derive(Clone, Debug, PartialEq)]
         pub(super) struct Values {
             $(pub(super) $field: $type,)+
@@ -130,7 +131,8 @@ macro_rules! settings {
             }
         }
 
-        /// Settings made by a program. What is not set is as in the paper; the seed is 0.
+        /// Settings made by a program. Unset values default to those of the paper; the seed
+        /// defaults to 0.
         ///
         /// ```
         /// use minimal_surprise_evolution::settings::Settings;
@@ -251,13 +253,13 @@ settings! {
     parse |text, _: &Values| probability(text).map(Some),
     write |mutation: &Option<f64>| mutation.map(Scalar::from);
 
-    /// How parents are chosen: roulette, or tournament:K for the best of K genomes drawn.
+    /// Selection of parents: roulette, or tournament:K for the best of K genomes drawn.
     selection(Selection): Selection = Selection::Roulette,
     "selection", "METHOD", default "roulette",
     valid "`roulette`, or `tournament:K` with K from 1 to 1000000", list "selection",
     parse |text, _: &Values| Selection::parse(text),
     write |&selection: &Selection| {
-        // Added later: runs with the default are named as before.
+        // Added later: left out if it has the default, so that existing runs keep their IDs.
         (selection != Selection::Roulette).then(|| selection.to_string().into())
     };
 

@@ -1,9 +1,10 @@
-//! Values of settings as text: one parser and one name each, for files, flags and suites.
+//! Text form of settings values: one parser and one name per value, for files, flags and suites.
 
 use minimal_surprise_controller::{Prediction, SensorModel, Template, Topology};
 use minimal_surprise_sim::Grid;
 
-/// Maximum number of generations of a run, genomes of a population and repetitions of an evaluation.
+/// Maximum number of generations of a run, genomes of a population and repetitions of an
+/// evaluation.
 pub const COUNT_MAX: u32 = 1_000_000;
 
 /// Maximum number of threads of a command.
@@ -11,10 +12,10 @@ pub const THREADS_MAX: u32 = 1024;
 
 pub(super) const PROBABILITY: &str = "expected a probability from 0 to 1";
 
-/// A probability.
+/// Parses a probability.
 ///
 /// # Errors
-/// What would be valid.
+/// A description of valid probabilities, if `text` is not one.
 pub fn probability(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
@@ -22,10 +23,10 @@ pub fn probability(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A whole number from 1 to `most`.
+/// Parses a whole number from 1 to `most`.
 ///
 /// # Errors
-/// What would be valid.
+/// A description of valid numbers, if `text` is not one.
 pub fn count(text: &str, most: u32) -> Result<u32, String> {
     match text.parse() {
         Ok(value) if (1..=most).contains(&value) => Ok(value),
@@ -33,10 +34,10 @@ pub fn count(text: &str, most: u32) -> Result<u32, String> {
     }
 }
 
-/// A grid written as `15x15`.
+/// Parses a grid written as `15x15`.
 ///
 /// # Errors
-/// What would be valid.
+/// A description of valid grids, if `text` is not one.
 pub fn grid(text: &str) -> Result<Grid, String> {
     let sides = text
         .split_once('x')
@@ -46,19 +47,19 @@ pub fn grid(text: &str) -> Result<Grid, String> {
     Grid::new(width, height).map_err(|error| error.to_string())
 }
 
-/// A seed.
+/// Parses a seed.
 ///
 /// # Errors
-/// What would be valid.
+/// A description of valid seeds, if `text` is not one.
 pub fn seed(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
 }
 
-/// A sensor model.
+/// Parses a sensor model.
 ///
 /// # Errors
-/// What would be valid.
+/// A description of valid sensor models, if `text` is not one.
 pub(super) fn model(text: &str) -> Result<SensorModel, String> {
     SensorModel::ALL
         .into_iter()
@@ -66,7 +67,7 @@ pub(super) fn model(text: &str) -> Result<SensorModel, String> {
         .ok_or_else(|| "sensor models are a, b and c".to_owned())
 }
 
-/// The name of a sensor model in files and flags.
+/// Returns the name of a sensor model in files and flags.
 #[must_use]
 pub fn model_name(model: SensorModel) -> &'static str {
     match model {
@@ -76,10 +77,10 @@ pub fn model_name(model: SensorModel) -> &'static str {
     }
 }
 
-/// A template of predictions.
+/// Parses a template of predictions.
 ///
 /// # Errors
-/// What would be valid.
+/// A description of valid templates, if `text` is not one.
 pub(super) fn template(text: &str) -> Result<Template, String> {
     Template::ALL
         .into_iter()
@@ -90,7 +91,7 @@ pub(super) fn template(text: &str) -> Result<Template, String> {
         })
 }
 
-/// A topology in words.
+/// Describes a topology.
 #[must_use]
 pub fn describe(topology: Topology) -> String {
     let model = model_name(topology.model()).to_uppercase();
@@ -106,17 +107,17 @@ pub fn describe(topology: Topology) -> String {
     }
 }
 
-/// Largest seed that is drawn: whole numbers up to here are exact in programs that compute JSON's
-/// numbers in floating point.
+/// Largest seed that is drawn: whole numbers up to this are exact in programs that read JSON
+/// numbers as floating point.
 pub const DRAWN_SEED_MAX: u64 = 1 << 53;
 
-/// A seed as text, for JSON, if other programs would read another number.
+/// Returns a seed as text, for JSON, if other programs would read it inexactly as a number.
 #[must_use]
 pub fn seed_text(seed: u64) -> Option<String> {
     (seed > DRAWN_SEED_MAX).then(|| seed.to_string())
 }
 
-/// Adds a seed to an object of JSON, and as `seed_text` if need be.
+/// Adds a seed to a JSON object, and as `seed_text` if needed.
 pub fn add_seed(object: &mut serde_json::Value, seed: u64) {
     object["seed"] = seed.into();
     if let Some(text) = seed_text(seed) {
