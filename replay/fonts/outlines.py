@@ -1,5 +1,6 @@
-"""Prints the outlines of a TrueType font's characters, one line each: code point in hexadecimal,
-advance and path data in font units, y upwards. The first line has the units per em.
+"""Prints the outlines of a TrueType font's characters, one line per character: code point in
+hexadecimal, advance and path data in font units, y upwards. The first line contains the units per
+em.
 """
 
 import sys

@@ -1,5 +1,5 @@
-//! Colours and outlines, the same in every picture. Colour-blind readers can tell the hues (Okabe
-//! and Ito's) apart; where colour is not enough, shapes differ.
+//! Colours and outlines, the same in every picture. The hues (Okabe and Ito's) can be distinguished
+//! by colour-blind readers; where colour is not enough, shapes differ.
 
 use super::scene::{Ink, Mark};
 use serde::Serialize;
@@ -7,9 +7,9 @@ use serde::Serialize;
 /// Colours on a light or dark background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Theme {
-    /// The background.
+    /// Background.
     pub ground: &'static str,
-    /// An empty cell.
+    /// Empty cells.
     pub cell: &'static str,
     /// Lines between cells.
     pub line: &'static str,
@@ -21,7 +21,7 @@ pub struct Theme {
     pub plain: &'static str,
     /// Robots of the dominant structure.
     pub named: &'static str,
-    /// Robots of another structure.
+    /// Robots of other structures.
     pub other: &'static str,
     /// Robots of no structure; drawn as outlines.
     pub outside: &'static str,
@@ -35,7 +35,7 @@ pub struct Theme {
     pub expects: &'static str,
 }
 
-/// For a light background.
+/// Colours on a light background.
 pub const LIGHT: Theme = Theme {
     ground: "#ffffff",
     cell: "#f4f4f2",
@@ -52,7 +52,7 @@ pub const LIGHT: Theme = Theme {
     expects: "#8a5aa8",
 };
 
-/// For a dark background.
+/// Colours on a dark background.
 pub const DARK: Theme = Theme {
     ground: "#161615",
     cell: "#20201f",
@@ -69,11 +69,11 @@ pub const DARK: Theme = Theme {
     expects: "#cc9ee0",
 };
 
-/// The outline of a robot facing east: an arrowhead in a cell from (0, 0), north-west, to (1, 1).
+/// Outline of a robot facing east: an arrowhead in a cell from (0, 0), north-west, to (1, 1).
 pub const ARROW: [[f64; 2]; 4] = [[0.88, 0.5], [0.16, 0.84], [0.32, 0.5], [0.16, 0.16]];
 
 impl Theme {
-    /// The colour of a robot.
+    /// Returns the colour of a robot.
     #[must_use]
     pub fn ink(&self, ink: Ink) -> &'static str {
         match ink {
@@ -85,8 +85,8 @@ impl Theme {
         }
     }
 
-    /// The colour of a mark. Hits are squares, misses are crosses, expectations are rings; filled
-    /// or thick where a robot was sensed or is expected, else hollow or thin.
+    /// Returns the colour of a mark. Hits are squares, misses are crosses, expectations are rings;
+    /// filled or thick where a robot was sensed or is expected, otherwise hollow or thin.
     #[must_use]
     pub fn mark(&self, mark: Mark) -> &'static str {
         match mark {
@@ -97,7 +97,7 @@ impl Theme {
     }
 }
 
-/// Returns whether a robot is drawn as an outline only.
+/// Checks whether a robot is drawn as an outline only.
 #[must_use]
 pub fn is_hollow(ink: Ink) -> bool {
     matches!(ink, Ink::Outside | Ink::Surprise(0))

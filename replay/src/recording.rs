@@ -1,4 +1,4 @@
-//! A recorded run: every state, and what the robots sensed, did and predicted.
+//! Recorded runs: every state, and the readings, actions and predictions of the robots.
 //!
 //! State `t` is the swarm after `t` steps, `t` = 0 to T. In step `t`, from state `t` to `t + 1`,
 //! every robot takes a reading, compares it with its prediction from the previous step, acts, and
@@ -17,7 +17,7 @@ use minimal_surprise_sim::structures::{Membership, Structure, classify};
 use minimal_surprise_sim::{Area, Grid, Pose, Scenario, Trace, TraceStep, Trial, WorldError};
 use rayon::prelude::*;
 
-/// A run to show.
+/// A run to be shown.
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// The torus.
@@ -33,9 +33,9 @@ pub struct Recording {
     pub names: Vec<Structure>,
     /// Temperature of every step, 0 to 1 (paper, Eqs. 2–3).
     pub temperature: Vec<f64>,
-    /// The hash of the steps, computed from this recording.
+    /// Hash of the steps, computed from this recording.
     pub steps_hash: Option<StepsHash>,
-    /// Where the recording comes from.
+    /// Origin of the recording.
     pub origin: Origin,
 }
 
@@ -54,7 +54,7 @@ pub struct ControllerData {
     pub average_prediction: Vec<f64>,
 }
 
-/// Where a recording comes from.
+/// Origin of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Origin {
     /// Path of the file or directory, as given by the user.
@@ -63,7 +63,7 @@ pub struct Origin {
     pub seed: Option<u64>,
     /// Hash of the evolution.
     pub run_hash: Option<String>,
-    /// The hash of the steps that the run recorded, to compare with.
+    /// Steps hash recorded by the run, for comparison.
     pub steps_hash: Option<RecordedHash>,
     /// Sensor noise: the probability that a bit is flipped.
     pub noise: f64,
@@ -109,7 +109,7 @@ impl Recording {
     /// Damages the final state of an evolution, and records how the swarm continues.
     ///
     /// # Errors
-    /// [`DamageError`] if nothing is left to run.
+    /// [`DamageError`] if no robot is left to run.
     pub fn of_damage(
         name: &str,
         finished: &FinishedRun,
@@ -129,7 +129,7 @@ impl Recording {
         Ok(Self { names, ..recording })
     }
 
-    /// Records a run of a genome under the given conditions.
+    /// Records a run of a genome with the given settings.
     ///
     /// # Errors
     /// [`WorldError`] if the starting poses do not fit the grid.
@@ -230,19 +230,19 @@ impl Recording {
         })
     }
 
-    /// Number of steps, T; there are T + 1 states.
+    /// Returns the number of steps, T; the number of states is T + 1.
     #[must_use]
     pub fn steps(&self) -> usize {
         self.trace.steps.len()
     }
 
-    /// Number of robots.
+    /// Returns the number of robots.
     #[must_use]
     pub fn robots(&self) -> usize {
         self.trace.final_poses.len()
     }
 
-    /// Poses of state `t`; beyond the last state, the final poses.
+    /// Returns the poses of state `t`; beyond the last state, the final poses.
     #[must_use]
     pub fn poses(&self, t: usize) -> &[Pose] {
         self.trace
@@ -251,13 +251,14 @@ impl Recording {
             .map_or(&self.trace.final_poses, |step| &step.poses)
     }
 
-    /// A robot's reading in step `t` with noise; `None` in the last state and for a trajectory.
+    /// Returns a robot's reading in step `t` with noise; `None` in the last state and for a
+    /// trajectory.
     #[must_use]
     pub fn sensed(&self, t: usize, robot: usize) -> Option<SensorBits> {
         self.trace.steps.get(t)?.readings.get(robot).copied()
     }
 
-    /// A robot's prediction for state `t`; `None` for a trajectory.
+    /// Returns a robot's prediction for state `t`; `None` for a trajectory.
     #[must_use]
     pub fn predicted(&self, t: usize, robot: usize) -> Option<SensorBits> {
         match t.checked_sub(1) {
@@ -269,20 +270,20 @@ impl Recording {
         }
     }
 
-    /// Returns whether a robot belongs to a structure in state `t`.
+    /// Checks whether a robot belongs to a structure in state `t`.
     #[must_use]
     pub fn is_member(&self, t: usize, robot: usize, structure: Structure) -> bool {
         let members = self.members.get(t).and_then(|robots| robots.get(robot));
         members.is_some_and(|members| members.contains(structure))
     }
 
-    /// The run's dominant structure; of tied ones, the first in the paper's order.
+    /// Returns the run's dominant structure; if tied, the first in the paper's order.
     #[must_use]
     pub fn name(&self) -> Option<Structure> {
         self.names.first().copied()
     }
 
-    /// Number of robots in the run's dominant structure in state `t`.
+    /// Returns the number of robots in the run's dominant structure in state `t`.
     #[must_use]
     pub fn in_structure(&self, t: usize) -> usize {
         self.name().map_or(0, |name| {
@@ -293,7 +294,7 @@ impl Recording {
         })
     }
 
-    /// The damaged area.
+    /// Returns the damaged area.
     #[must_use]
     pub fn damaged_area(&self) -> Option<Area> {
         self.origin.damage.as_ref().map(|damaged| {

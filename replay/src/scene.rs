@@ -1,6 +1,6 @@
-//! One state of a run, ready to draw: where the robots are, in which ink, and which cells are
-//! marked. Back ends draw scenes and know nothing else about a run. The page's script repeats the
-//! rules of this file; a test compares the two.
+//! One state of a run, ready to draw: positions and inks of the robots, and marked cells. Back ends
+//! draw scenes without any other access to the run. The page's script repeats the rules of this
+//! file; a test compares the two.
 
 use super::recording::Recording;
 use minimal_surprise_controller::SensorBits;
@@ -8,17 +8,17 @@ use minimal_surprise_sim::structures::classify;
 use minimal_surprise_sim::{Grid, Pose, Structure};
 use serde::Serialize;
 
-/// What the colours of robots show.
+/// Meaning of the robots' colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Colouring {
-    /// Whether a robot belongs to the run's dominant structure, another one, or none.
+    /// Membership in the run's dominant structure, a different one, or none.
     #[default]
     Structure,
-    /// How many of its sensors a robot mispredicted.
+    /// Share of mispredicted sensors.
     Surprise,
-    /// Nothing.
+    /// None: all robots have the same colour.
     Plain,
 }
 
@@ -42,63 +42,63 @@ pub struct Scene {
 /// A robot to draw: an arrow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Robot {
-    /// Cells from the west edge.
+    /// Number of cells from the west edge.
     pub x: u16,
-    /// Cells from the south edge.
+    /// Number of cells from the south edge.
     pub y: u16,
     /// 0 east, 1 north, 2 west, 3 south.
     pub heading: u8,
-    /// Its colour and shape.
+    /// Colour and shape.
     pub ink: Ink,
 }
 
-/// What a robot's colour and shape show.
+/// Meaning of a robot's colour and shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ink {
-    /// Nothing.
+    /// No meaning.
     Plain,
-    /// It belongs to the run's dominant structure.
+    /// The robot belongs to the run's dominant structure.
     Named,
-    /// It belongs to another structure.
+    /// The robot belongs to a different structure.
     Other,
-    /// It belongs to none: drawn hollow.
+    /// The robot belongs to no structure: drawn hollow.
     Outside,
-    /// It mispredicted none (0), up to 1/8 (1), up to 1/4 (2) or more (3) of its sensors.
+    /// The robot mispredicted none (0), up to 1/8 (1), up to 1/4 (2) or more (3) of its sensors.
     Surprise(u8),
 }
 
 /// A marked cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct MarkedCell {
-    /// Cells from the west edge.
+    /// Number of cells from the west edge.
     pub x: u16,
-    /// Cells from the south edge.
+    /// Number of cells from the south edge.
     pub y: u16,
-    /// What the robot sensed and predicted there.
+    /// The reading and prediction for this cell.
     pub mark: Mark,
 }
 
-/// What a robot sensed and predicted in a cell.
+/// A robot's reading and prediction for a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mark {
-    /// Sensed a robot and had predicted one.
+    /// Occupied, as predicted.
     HitOccupied,
-    /// Sensed none and had predicted none.
+    /// Empty, as predicted.
     HitEmpty,
-    /// Sensed a robot and had predicted none.
+    /// Occupied, but predicted empty.
     MissOccupied,
-    /// Sensed none and had predicted one.
+    /// Empty, but predicted occupied.
     MissEmpty,
-    /// Predicts a robot; the run ends before it senses.
+    /// Predicted occupied; the run ends before the robot senses the cell.
     ExpectsOccupied,
-    /// Predicts none; the run ends before it senses.
+    /// Predicted empty; the run ends before the robot senses the cell.
     ExpectsEmpty,
 }
 
 impl Scene {
-    /// State `t` of a recording.
+    /// Creates the scene of state `t` of a recording.
     #[must_use]
     pub fn of(
         recording: &Recording,
@@ -125,8 +125,8 @@ impl Scene {
         }
     }
 
-    /// Creates the scene of a swarm of which only poses are known. Its robots are coloured by whether
-    /// they belong to `structure`, to another structure, or to none.
+    /// Creates the scene of a swarm with known poses only. Its robots are coloured by membership in
+    /// `structure`, a different structure, or none.
     #[must_use]
     pub fn of_swarm(grid: Grid, poses: &[Pose], structure: Option<Structure>) -> Self {
         let members = classify(grid, poses).map(|found| found.memberships());
@@ -147,8 +147,8 @@ impl Scene {
         }
     }
 
-    /// Creates the scene of the swarm before it was damaged. Its robots are coloured by structure or
-    /// not at all.
+    /// Creates the scene of the swarm before the damage. Its robots are coloured by structure or not
+    /// at all.
     #[must_use]
     pub fn before_damage(recording: &Recording, poses: &[Pose], colouring: Colouring) -> Self {
         let mut scene = Self::of_swarm(recording.grid, poses, recording.name());
@@ -191,7 +191,8 @@ fn ink_of_member(is_member: impl Fn(Structure) -> bool, name: Option<Structure>)
     }
 }
 
-/// How surprised a robot is in state `t`, in four levels; `None` where nothing was sensed.
+/// Returns the surprise of a robot in state `t`, in four levels; `None` if the robot sensed
+/// nothing.
 fn surprise(recording: &Recording, t: usize, robot: usize) -> Option<u8> {
     let sensors = recording.controller.as_ref()?.topology.sensors() as u32;
     let sensed = recording.sensed(t, robot)?;

@@ -1,7 +1,7 @@
 //! A gallery: one page with the final state of every run, each linked to its replay.
 //!
-//! It is a folder of pages, `index.html` and one per run, so that it opens quickly however many
-//! runs it has.
+//! A gallery is a folder of pages, `index.html` and one per run, so that it opens quickly whatever
+//! the number of runs.
 
 use super::page::html::Document;
 use super::page::{self, PageError, encoding, prediction_name};
@@ -28,12 +28,12 @@ use std::path::{Path, PathBuf};
 
 /// The first page of a gallery.
 pub const INDEX: &str = "index.html";
-/// Marks a folder as a gallery.
+/// Name of the file that marks a folder as a gallery.
 const MARKER: &str = ".evolver-gallery";
-/// How many folders deep runs are searched for.
+/// Depth of the search for runs, in folders.
 const DEPTH: usize = 3;
 
-/// A gallery could not be written.
+/// Error: a gallery could not be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GalleryError {
@@ -56,7 +56,7 @@ pub enum GalleryError {
         /// The cause.
         error: minimal_surprise_sim::WorldError,
     },
-    /// There are no complete runs.
+    /// The directories contain no complete run.
     #[error("no complete run in {}", list(.0))]
     Empty(Vec<PathBuf>),
     /// Every run is damaged.
@@ -80,13 +80,13 @@ pub struct Written {
     pub index: PathBuf,
     /// Number of runs.
     pub runs: usize,
-    /// Number of run directories left out because their runs have not ended.
+    /// Number of run directories left out because their runs are incomplete.
     pub unfinished: usize,
     /// Runs left out because they are damaged, and folders that could not be read.
     pub damaged: DamagedRuns,
     /// Size of all pages.
     pub bytes: u64,
-    /// Whether another process wrote the gallery in the meantime.
+    /// True if another process wrote the gallery in the meantime.
     pub by_another: bool,
 }
 
@@ -96,7 +96,7 @@ pub struct Written {
 /// existing folder, pages are replaced one by one and other files are kept.
 ///
 /// # Errors
-/// [`GalleryError`]; a new folder is then not published.
+/// [`GalleryError`] if a page cannot be drawn or written; a new folder is then not published.
 pub fn write(
     directories: &[PathBuf],
     out: &Path,
@@ -142,10 +142,10 @@ pub fn write(
     }
 }
 
-/// Run directories.
+/// The run directories found.
 #[derive(Debug, Default)]
 struct Found {
-    /// Each with the name of its page.
+    /// The run directories, each with the name of its page.
     runs: Vec<(PathBuf, String)>,
     unfinished: usize,
     seen: BTreeSet<PathBuf>,
@@ -174,7 +174,7 @@ impl Found {
         let mut inside = Vec::new();
         for entry in fs::read_dir(directory).map_err(at())? {
             let entry = entry.map_err(at())?;
-            // Temporary files can be renamed at any moment.
+            // Temporary files can be renamed at any moment, so they are skipped.
             if !files::is_part(&entry.file_name()) {
                 inside.push(entry.path());
             }
@@ -208,8 +208,8 @@ impl Found {
         Ok(())
     }
 
-    /// Checks that the memory suffices for the largest recordings, one per thread. Errors of
-    /// reading are reported later.
+    /// Checks that the memory suffices for the largest recordings, one per thread. Read errors are
+    /// reported later.
     fn check_memory(&self) -> Result<(), TooMuch> {
         let at_once = self.runs.len().min(rayon::current_num_threads()) as f64;
         let settings = self
@@ -221,7 +221,7 @@ impl Found {
         largest.map_or(Ok(()), |needs| needs.times(at_once).check_memory())
     }
 
-    /// Writes all pages, the first page last; `out` is their final place.
+    /// Writes all pages, the first page last; `out` is the folder's final path.
     fn write(&self, folder: &Path, out: &Path) -> Result<Written, GalleryError> {
         let cards = self.runs.par_iter().map(|(run, name)| {
             let recording = read(run)?;
@@ -262,7 +262,7 @@ impl Found {
     }
 }
 
-/// Returns whether a folder is marked as a gallery.
+/// Checks whether a folder is marked as a gallery.
 ///
 /// # Errors
 /// [`FileError`] if the folder cannot be read.
@@ -274,7 +274,8 @@ pub fn is_marked(folder: &Path) -> Result<bool, FileError> {
     }
 }
 
-/// Progress of the run in a directory, from the files present; `Pending` without any.
+/// Returns the progress of the run in a directory, based on the files present; `Pending` if there
+/// are none.
 fn progress(path: &Path) -> Result<Progress, FileError> {
     Ok(if files::exists(&path.join(DONE))? {
         Progress::Done

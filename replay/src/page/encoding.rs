@@ -1,7 +1,7 @@
-//! The states of a recording as text for a page: bytes, deflated, in base64.
+//! Encoding of a recording's states as text for a page: bytes, deflated, in base64.
 //!
-//! Only what robots did and predicted, and which structures they belong to, is stored. The page
-//! recomputes readings from poses and the noise key, and poses from moves.
+//! Only the robots' actions, predictions and structures are stored. The page recomputes readings
+//! from poses and the noise key, and poses from moves.
 //!
 //! | content | bytes |
 //! |---|---|
@@ -12,13 +12,14 @@
 //! | blocks of [`BLOCK`] steps, see below | |
 //!
 //! A block has `n` steps and their `n + 1` states; its last state is the first of the next block.
-//! It consists of planes: one byte per robot and step (or state), robot after robot. A plane of
+//! A block consists of planes: one byte per robot and step (or state), robot by robot. A plane of
 //! states stores the first state, then the exclusive or of each state with the previous one.
 //! Numbers are little-endian.
 //!
 //! | plane of a block | one byte per | present if |
 //! |---|---|---|
-//! | move: bit 0 action, bit 1 turn, bit 2 whether it moved | step | it is not a trajectory |
+//! | move: bit 0 action, bit 1 turn, bit 2 whether the robot moved | step | it is not a trajectory
+//! |
 //! | prediction, low byte; high byte | state | it is not a trajectory; more than 8 sensors |
 //! | x low, x high, y low, y high, heading | state | it is a trajectory |
 //! | structures | state | always |
@@ -35,16 +36,16 @@ use std::io::Write;
 /// Steps per block: the page decodes one block at a time.
 pub const BLOCK: usize = 128;
 
-/// What the page needs to know to read the bytes.
+/// The parameters that the page needs to decode the bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Layout {
     /// Number of robots.
     pub robots: usize,
-    /// Number of steps; there is one more state.
+    /// Number of steps; the number of states is one more.
     pub steps: usize,
     /// Steps per block.
     pub block: usize,
-    /// Whether more than poses is known.
+    /// True if the recording contains more than poses.
     pub has_controller: bool,
     /// Bytes per prediction.
     pub prediction_bytes: usize,
@@ -76,7 +77,7 @@ pub fn encode(recording: &Recording) -> (Layout, String) {
     (layout, packed(&[&[bytes][..], &blocks].concat()))
 }
 
-/// Bytes as text: deflated with a zlib header, in base64.
+/// Compresses bytes to text: deflated with a zlib header, in base64.
 #[must_use]
 pub fn packed(parts: &[Vec<u8>]) -> String {
     let mut deflate = ZlibEncoder::new(Vec::new(), Compression::default());
@@ -94,7 +95,7 @@ fn sensors(recording: &Recording) -> usize {
         .map_or(0, |data| data.topology.sensors())
 }
 
-/// The number of mispredicted bits and of robots that moved, per step, and of robots in the
+/// Returns the number of mispredicted bits and of robots that moved, per step, and of robots in the
 /// dominant structure, per state.
 fn counts(recording: &Recording) -> impl Iterator<Item = u32> {
     let steps = 0..recording.steps();
@@ -118,7 +119,7 @@ fn has_moved(from: Pose, to: Pose) -> bool {
     (from.x, from.y) != (to.x, to.y)
 }
 
-/// The block that starts with step `first`.
+/// Encodes the block that starts with step `first`.
 fn block(recording: &Recording, layout: Layout, first: usize) -> Vec<u8> {
     let steps = BLOCK.min(layout.steps - first);
     let mut bytes = Vec::new();
@@ -155,7 +156,7 @@ fn move_code(recording: &Recording, t: usize, robot: usize) -> u8 {
     decision.action as u8 | (decision.turn as u8) << 1 | u8::from(moved) << 2
 }
 
-/// A plane of steps.
+/// Encodes a plane of steps.
 fn per_step(
     layout: Layout,
     first: usize,
@@ -169,7 +170,7 @@ fn per_step(
         .collect()
 }
 
-/// A plane of states.
+/// Encodes a plane of states.
 fn per_state(
     layout: Layout,
     first: usize,

@@ -1,4 +1,4 @@
-//! What all pages share: one self-contained document.
+//! The common frame of all pages: one self-contained document.
 
 use crate::palette::{DARK, LIGHT, Theme};
 use minimal_surprise_controller::Turn;
@@ -6,7 +6,7 @@ use minimal_surprise_evolution::text;
 use serde_json::Value;
 use std::fmt::Write;
 
-/// Turns by their number on the page.
+/// Turns, by their number on the page.
 pub(super) const TURNS: [Turn; 2] = [Turn::CounterClockwise, Turn::Clockwise];
 const _: () = assert!(TURNS[0] as u8 == 0 && TURNS[1] as u8 == 1);
 
@@ -28,7 +28,8 @@ pub struct Document<'a> {
 }
 
 impl Document<'_> {
-    /// The text of the file. Its security policy forbids the browser to load anything.
+    /// Returns the text of the file. Its security policy prevents the browser from loading
+    /// anything.
     #[must_use]
     pub fn to_html(&self) -> String {
         let Self {
@@ -63,7 +64,7 @@ impl Document<'_> {
     }
 }
 
-/// The colours of a theme as CSS variables.
+/// Formats the colours of a theme as CSS variables.
 fn variables(theme: &Theme) -> String {
     let mut text = String::new();
     if let Ok(Value::Object(colours)) = serde_json::to_value(theme) {

@@ -1,8 +1,8 @@
 //! A replay as one self-contained page: it opens as a file, without a network, is controlled by
 //! mouse and keyboard, and verifies the states that it shows.
 //!
-//! The page gets what to show and how to draw it as JSON, and the states packed by [`encoding`].
-//! Its script follows the rules of [`super::scene`].
+//! The page receives its parameters as JSON and the states packed by [`encoding`]. The page's
+//! script follows the rules of [`super::scene`].
 
 pub mod encoding;
 pub mod html;
@@ -18,16 +18,16 @@ use minimal_surprise_sim::damage::Damage;
 use minimal_surprise_sim::{Grid, Heading, Structure};
 use serde_json::{Value, json};
 
-/// Maximum number of robot-steps on a page: what browsers open without trouble.
+/// Maximum number of robot-steps on a page, which browsers open without trouble.
 pub const ROBOT_STEPS_MAX: u64 = 20_000_000;
 /// Maximum number of cells of a page's torus.
 pub const CELLS_MAX: u32 = 4_000_000;
 
-/// A recording is too large for a page.
+/// Error: a recording is too large for a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PageError {
-    /// Too many steps of too many robots.
+    /// The recording has too many robot-steps.
     #[error(
         "{robots} robots and {steps} steps; a page holds up to {} million robot-steps",
         ROBOT_STEPS_MAX / 1_000_000
@@ -38,7 +38,7 @@ pub enum PageError {
         /// Number of steps.
         steps: usize,
     },
-    /// Too large a torus.
+    /// The torus is too large.
     #[error("a grid of {cells} cells; a page shows up to {CELLS_MAX}")]
     TooWide {
         /// Number of cells.
@@ -49,7 +49,7 @@ pub enum PageError {
 /// Checks that a recording of this size fits a page.
 ///
 /// # Errors
-/// [`PageError`] if there is too much to show.
+/// [`PageError`] if the recording is too large.
 pub fn check_page(robots: usize, steps: usize, grid: Grid) -> Result<(), PageError> {
     if (robots as u64).saturating_mul(steps as u64) > ROBOT_STEPS_MAX {
         return Err(PageError::TooLong { robots, steps });
@@ -61,10 +61,10 @@ pub fn check_page(robots: usize, steps: usize, grid: Grid) -> Result<(), PageErr
     Ok(())
 }
 
-/// The page. In a gallery, it links back to the gallery's first page.
+/// Creates the page. In a gallery, it links back to the gallery's first page.
 ///
 /// # Errors
-/// [`PageError`] if there is too much to show.
+/// [`PageError`] if the recording is too large.
 pub fn page(
     recording: &Recording,
     colouring: scene::Colouring,
@@ -87,7 +87,7 @@ pub fn page(
     .to_html())
 }
 
-/// Everything but the states.
+/// Returns the page's data except for the states.
 fn about(recording: &Recording) -> Value {
     let origin = &recording.origin;
     let controller = recording.controller.as_ref();
@@ -136,7 +136,7 @@ fn about(recording: &Recording) -> Value {
     })
 }
 
-/// Returns what the page generates the noise from; `None` without noise.
+/// Returns the parameters of the noise generator; `None` without noise.
 fn flips(controller: &ControllerData, origin: &Origin) -> Option<Value> {
     let key = controller.noise.key();
     let words = key.as_chunks::<4>().0.iter();
@@ -155,7 +155,7 @@ fn flips(controller: &ControllerData, origin: &Origin) -> Option<Value> {
     })
 }
 
-/// Returns which inks are drawn as outlines.
+/// Returns, for each ink, whether it is drawn as an outline.
 pub(super) fn hollow() -> Value {
     let inks = [
         ("plain", Ink::Plain),
@@ -173,7 +173,7 @@ pub(super) fn hollow() -> Value {
         .into()
 }
 
-/// The title of the run: its dominant structures.
+/// Returns the title of the run: its dominant structures.
 fn title(recording: &Recording) -> String {
     let names: Vec<&str> = recording.names.iter().map(|name| name.name()).collect();
     let mut title = if names.is_empty() {
@@ -187,14 +187,14 @@ fn title(recording: &Recording) -> String {
     title
 }
 
-/// The last part of a path: pages do not disclose the folders of their author.
+/// Returns the last part of a path: pages do not disclose the folders of their author.
 pub(super) fn source(name: &str) -> String {
     let path = std::path::Path::new(name);
     let last = path.file_name().map(|last| last.to_string_lossy());
     last.map_or_else(|| name.to_owned(), |last| last.into_owned())
 }
 
-/// Returns which predictions are fixed.
+/// Describes the predictions of a topology.
 #[must_use]
 pub fn prediction_name(topology: Topology) -> String {
     match topology.prediction() {

@@ -3,7 +3,7 @@ const { robots: R, steps: T, block: BLOCK } = layout;
 
 /* ---- The recording ---- */
 
-/* Everything that the page knows about the run; the counterpart of recording.rs. */
+/* The run's data on the page; the counterpart of recording.rs. */
 class Recording {
   constructor(bytes) {
     this.bytes = bytes;
@@ -122,7 +122,7 @@ class Recording {
     return decoded;
   }
 
-  /* The block that contains a state, and where the state starts in its arrays. */
+  /* The block that contains a state, and the state's offset in its arrays. */
   at(t) {
     const block = Math.min(Math.floor(t / BLOCK), this.offsets.length - 1);
     let decoded = this.recent.get(block);
@@ -134,7 +134,7 @@ class Recording {
     return { block: decoded, from: (t - decoded.first) * R };
   }
 
-  /* What every robot senses in step t; null after the last step and for trajectories. */
+  /* The readings of all robots in step t; null after the last step and for trajectories. */
   sensed(t) {
     if (!layout.has_controller || t >= T) return null;
     if (this.sensedOf !== t) {
@@ -155,7 +155,7 @@ class Board {
     this.noise = about.flips ? new Noise(about.flips, flipped) : null;
   }
 
-  /* What all robots sense in a state, noise included. */
+  /* The readings of all robots in a state, including noise. */
   sense({ first, xs, ys, headings }, from, readings = new Uint16Array(R)) {
     const { cells } = this;
     for (let i = from; i < from + R; i++) cells[ys[i] * width + xs[i]] = 1;
@@ -164,7 +164,7 @@ class Board {
       const offsets = about.offsets[headings[i]];
       let bits = 0;
       for (let sensor = 0; sensor < offsets.length; sensor++) {
-        // A side may be shorter than two cells are long.
+        // A side of the grid may be shorter than two cells.
         const x = wrapped(xs[i] + offsets[sensor][0], width);
         const y = wrapped(ys[i] + offsets[sensor][1], height);
         bits |= cells[y * width + x] << sensor;
@@ -186,7 +186,7 @@ class Noise {
     this.words = new Int32Array(16);
   }
 
-  /* Flips bits of what all robots sense in a step. */
+  /* Flips bits in the readings of all robots in a step. */
   flip(step, readings) {
     this.start[14] = step;
     for (let robot = 0; robot < R; robot++) {
@@ -585,7 +585,7 @@ function addCurve(name, values, top, shown, ink, states = true) {
       pen.lineWidth = 1.5 * scale;
       pen.lineJoin = 'round';
       pen.beginPath();
-      // With more states than pixels, the minimum and maximum in each pixel.
+      // If there are more states than pixels, each pixel shows a minimum and a maximum.
       const height = (number) => down - 1 - (number / top) * (down - 2);
       const bins = Math.max(1, Math.min(last, across));
       for (let bin = 0; bin <= bins; bin++) {
@@ -716,7 +716,7 @@ function pause() {
 
 function tick(now) {
   if (!state.playing) return;
-  // A page that was hidden does not catch up.
+  // After being hidden, the page continues without skipping steps.
   elapsed += Math.max(0, Math.min(250, now - before)) * state.speed / 1000;
   before = now;
   const steps = Math.floor(elapsed);

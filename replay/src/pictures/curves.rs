@@ -1,4 +1,4 @@
-//! Values over time, as in the paper's Figs. 5 and 6, with the axes laid out by plotters.
+//! Charts of values over time (paper, Figs. 5 and 6), with the axes laid out by plotters.
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, channels, line, polygon};
 use super::style::{PictureError, named};
@@ -16,16 +16,16 @@ use plotters_backend::{
 };
 use std::convert::Infallible;
 
-/// Height of a curve relative to its width.
+/// Ratio of a curve's height to its width.
 const SHAPE: f64 = 0.56;
 
-/// Plotters has integer coordinates: this many per millimetre or pixel.
+/// Number of plotters' integer coordinates per millimetre or pixel.
 const FINE: f64 = 100.0;
 
 /// Width of a curve on a screen, in pixels.
 const SCREEN_WIDTH: f64 = 480.0;
 
-/// Temperature over the steps.
+/// Draws the temperature over the steps.
 pub(super) fn temperature(
     recording: &Recording,
     size: Size,
@@ -41,7 +41,7 @@ pub(super) fn temperature(
     )
 }
 
-/// Best fitness over the generations.
+/// Draws the best fitness over the generations.
 pub(super) fn fitness(
     recording: &Recording,
     size: Size,
@@ -67,18 +67,18 @@ fn tenths(value: f64, to: fn(f64) -> f64) -> f64 {
     to(value * 10.0) / 10.0
 }
 
-/// Values over steps or generations: a line, on bands.
+/// A chart of values over steps or generations: a line on top of bands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chart {
     /// Label of the horizontal axis.
     pub x: &'static str,
     /// Label of the vertical axis.
     pub y: &'static str,
-    /// Least and greatest *x*.
+    /// Minimum and maximum *x*.
     pub x_range: (f64, f64),
-    /// Least and greatest *y*.
+    /// Minimum and maximum *y*.
     pub y_range: (f64, f64),
-    /// Decimals of the numbers on the vertical axis.
+    /// Number of decimals on the vertical axis.
     pub decimals: usize,
     /// Areas between two lines, translucent: (*x*, lower *y*, upper *y*) in ascending *x*.
     pub bands: Vec<Vec<(f64, f64, f64)>>,
@@ -191,7 +191,7 @@ impl Chart {
     }
 }
 
-/// A drawing as a back end of plotters.
+/// A drawing used as a back end of plotters.
 struct Plot<'a> {
     drawing: &'a mut Drawing,
     /// North-west corner in the drawing.
@@ -220,7 +220,7 @@ impl Plot<'_> {
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
-/// Charts consist of lines, areas and text only.
+/// Implements only lines, areas and text, which are all that charts need.
 impl DrawingBackend for Plot<'_> {
     type ErrorType = Infallible;
 
@@ -275,7 +275,7 @@ impl DrawingBackend for Plot<'_> {
         let (x, y) = self.at(at);
         let colour = hexadecimal(style.color());
         let height = words::CAPITALS * self.drawing.size.words();
-        // From the anchor to the middle of the capitals.
+        // Distance from the anchor to the middle of the capitals.
         let down = match style.anchor().v_pos {
             VPos::Top => height / 2.0,
             VPos::Center => 0.0,
@@ -290,7 +290,7 @@ impl DrawingBackend for Plot<'_> {
                 };
                 self.drawing.words(text, anchor, (x, y + down), &colour);
             }
-            // The label of the vertical axis, by its middle.
+            // The label of the vertical axis, positioned by its middle.
             _ => self.drawing.words_upwards(text, (x + down, y), &colour),
         }
         Ok(())

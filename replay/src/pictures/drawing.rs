@@ -6,7 +6,7 @@ use svg::node::element::path::Data;
 use svg::node::element::{Group, Path, Rectangle, Title};
 use svg::{Document, Node};
 
-/// How large a picture is.
+/// Size of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Size {
     /// On paper: the width in millimetres; text is set at 7 points.
@@ -16,7 +16,7 @@ pub enum Size {
 }
 
 impl Size {
-    /// Font size: 7 points in millimetres, or pixels.
+    /// Returns the font size: 7 points in millimetres, or pixels.
     pub(super) fn words(self) -> f64 {
         match self {
             Self::Paper(_) => 2.47,
@@ -24,7 +24,7 @@ impl Size {
         }
     }
 
-    /// Margin around the picture.
+    /// Returns the margin around the picture.
     pub(super) fn margin(self) -> f64 {
         match self {
             Self::Paper(_) => 0.5,
@@ -32,7 +32,7 @@ impl Size {
         }
     }
 
-    /// The thinnest line.
+    /// Returns the width of the thinnest line.
     pub(super) fn hair(self) -> f64 {
         match self {
             Self::Paper(_) => 0.1,
@@ -40,7 +40,7 @@ impl Size {
         }
     }
 
-    /// On a screen rounded up to whole pixels, so that equal lengths look equal.
+    /// Rounds a length up to whole pixels on a screen, so that equal lengths look equal.
     pub(super) fn whole(self, length: f64) -> f64 {
         match self {
             Self::Paper(_) => length,
@@ -64,7 +64,7 @@ impl Size {
     }
 }
 
-/// How text is aligned to its position.
+/// Alignment of text relative to its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -72,7 +72,7 @@ pub(super) enum Anchor {
     End,
 }
 
-/// How a line is drawn.
+/// Colour and width of a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stroke<'a> {
     pub(super) colour: &'a str,
@@ -107,13 +107,13 @@ impl Drawing {
         self.height = height;
     }
 
-    /// Width in millimetres or pixels.
+    /// Returns the width in millimetres or pixels.
     #[must_use]
     pub fn width(&self) -> f64 {
         self.width
     }
 
-    /// The picture as SVG.
+    /// Returns the picture as SVG.
     #[must_use]
     pub fn svg(&self) -> String {
         let unit = self.size.unit();
@@ -132,7 +132,7 @@ impl Drawing {
         format!("{document}\n")
     }
 
-    /// A filled rectangle from its north-west corner.
+    /// Draws a filled rectangle from its north-west corner.
     pub(super) fn area(
         &mut self,
         (x, y): (f64, f64),
@@ -153,7 +153,7 @@ impl Drawing {
         self.content.append(path);
     }
 
-    /// Translucent, so that what lies below stays visible.
+    /// Fills an outline with a translucent colour, so that parts below stay visible.
     pub(super) fn tinted(&mut self, outline: Data, colour: &str) {
         let path = Path::new()
             .set("d", outline)
@@ -173,7 +173,7 @@ impl Drawing {
         self.content.append(path);
     }
 
-    /// Text whose capitals are centred on `y`.
+    /// Draws text with its capitals centred on `y`.
     pub(super) fn words(&mut self, words: &str, anchor: Anchor, (x, y): (f64, f64), colour: &str) {
         let size = self.size.words();
         let width = words::width(words, size);
@@ -191,7 +191,7 @@ impl Drawing {
         self.outlined(words::outlines(words, size, (x, base)), words, colour, None);
     }
 
-    /// Text rotated to run upwards, its capitals centred on `x`, its middle at `y`.
+    /// Draws text rotated to run upwards, with its capitals centred on `x` and its middle at `y`.
     pub(super) fn words_upwards(&mut self, words: &str, (x, y): (f64, f64), colour: &str) {
         let size = self.size.words();
         let start = -words::width(words, size) / 2.0;
@@ -201,7 +201,7 @@ impl Drawing {
     }
 
     fn outlined(&mut self, outlines: Data, words: &str, colour: &str, turned: Option<String>) {
-        // Programs cannot read outlines.
+        // Other programs, such as screen readers, cannot read outlines.
         let mut path = Path::new()
             .set("aria-label", words)
             .set("d", outlines)
@@ -213,7 +213,7 @@ impl Drawing {
     }
 }
 
-/// Red, green and blue of `#rrggbb`.
+/// Returns the red, green and blue of `#rrggbb`.
 pub(super) fn channels(colour: &str) -> [u8; 3] {
     [1, 3, 5].map(|at| {
         let digits = colour.get(at..at + 2).unwrap_or("00");
@@ -221,12 +221,12 @@ pub(super) fn channels(colour: &str) -> [u8; 3] {
     })
 }
 
-/// A closed outline.
+/// Returns a closed outline.
 pub(super) fn polygon(corners: &[(f64, f64)]) -> Data {
     line(corners).close()
 }
 
-/// A line through the points.
+/// Returns a line through the points.
 pub(super) fn line(points: &[(f64, f64)]) -> Data {
     let mut data = Data::new();
     for (index, &(x, y)) in points.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Animations: one frame per state, as GIF, or as MP4 where ffmpeg is installed.
+//! Animations: one frame per state, as GIF, or as MP4 if ffmpeg is installed.
 
 use super::raster::Pixels;
 use super::state;
@@ -14,29 +14,29 @@ use std::process::{Command, Stdio};
 /// An animation of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Film<'a> {
-    /// The run.
+    /// The run to show.
     pub recording: &'a Recording,
-    /// How its states are drawn; `size` is [`super::Size::Screen`].
+    /// Style of the frames; `size` is [`super::Size::Screen`].
     pub style: &'a Style,
-    /// Steps between two frames; the last state is always shown.
+    /// Number of steps between two frames; the last state is always shown.
     pub every: u32,
     /// Frames per second.
     pub frames_per_second: u32,
 }
 
-/// Frames drawn at the same time.
+/// Number of frames drawn in parallel.
 const AT_ONCE: usize = 16;
 
-/// How long a GIF shows its last frame before it restarts, in hundredths of a second.
+/// Time that a GIF shows its last frame before it restarts, in hundredths of a second.
 const PAUSE: u16 = 200;
 
-/// The palette index of pixels that a frame of a GIF does not change.
+/// Palette index of pixels that a GIF frame leaves unchanged.
 const UNCHANGED: u8 = 0;
 
 type Rgb = [u8; 3];
 
 impl Film<'_> {
-    /// The states that are shown.
+    /// Returns the states that are shown.
     #[must_use]
     pub fn states(&self) -> Vec<usize> {
         let last = last_shown(self.recording, self.style.colouring);
@@ -45,7 +45,7 @@ impl Film<'_> {
         states
     }
 
-    /// Draws all frames, and passes them on in order.
+    /// Draws all frames and passes them on in order.
     fn each(
         &self,
         mut take: impl FnMut(Pixels) -> Result<(), PictureError>,
@@ -65,7 +65,7 @@ impl Film<'_> {
     /// Encodes the run as a looping GIF.
     ///
     /// # Errors
-    /// [`PictureError`] if the recording lacks what is asked for, or a frame is too large.
+    /// [`PictureError`] if the recording lacks the requested data, or a frame is too large.
     pub fn gif(&self) -> Result<Vec<u8>, PictureError> {
         let mut palette = Palette::default();
         let mut frames: Vec<Frame<'static>> = Vec::new();
@@ -76,7 +76,7 @@ impl Film<'_> {
             size = (indexed.width, indexed.height);
             let mut frame = indexed.changed_since(before.as_ref());
             frame.delay = (100.0 / f64::from(self.frames_per_second)).round() as u16;
-            // Compressed immediately: many frames would not fit in memory otherwise.
+            // Compressed immediately, because many uncompressed frames would not fit into memory.
             frame.make_lzw_pre_encoded();
             frames.push(frame);
             before = Some(indexed);
@@ -98,10 +98,10 @@ impl Film<'_> {
         encode().map_err(|error: gif::EncodingError| PictureError::Encoding(error.to_string()))
     }
 
-    /// The run as MP4 (H.264), encoded by ffmpeg.
+    /// Encodes the run as MP4 (H.264), using ffmpeg.
     ///
     /// # Errors
-    /// [`PictureError`] as of [`Film::gif`], and if ffmpeg is missing or fails.
+    /// [`PictureError`] under the conditions of [`Film::gif`], and if ffmpeg is missing or fails.
     pub fn mp4(&self) -> Result<Vec<u8>, PictureError> {
         // MP4 is not written sequentially, so it cannot go to a pipe.
         let folder = tempfile::tempdir().map_err(PictureError::Ffmpeg)?;
@@ -115,7 +115,7 @@ impl Film<'_> {
             };
             size = Some((pixels.width, pixels.height));
             match &mut child.stdin {
-                // ffmpeg has stopped: its exit code and its messages say why.
+                // ffmpeg has stopped: its exit code and its messages give the reason.
                 Some(pipe) => match pipe.write_all(&pixels.rgb) {
                     Err(error) if error.kind() != ErrorKind::BrokenPipe => {
                         Err(PictureError::Ffmpeg(error))
@@ -131,7 +131,7 @@ impl Film<'_> {
         drop(child.stdin.take());
         let mut said = String::new();
         if let Some(pipe) = &mut child.stderr {
-            // Its messages matter only if it fails.
+            // The messages matter only if ffmpeg fails.
             let _ = pipe.read_to_string(&mut said);
         }
         let status = child.wait().map_err(PictureError::Ffmpeg)?;
@@ -144,10 +144,10 @@ impl Film<'_> {
         std::fs::read(&file).map_err(PictureError::Ffmpeg)
     }
 
-    /// Checks whether ffmpeg is installed, before anything is written.
+    /// Checks whether ffmpeg is installed, before any output is written.
     ///
     /// # Errors
-    /// [`PictureError`] if it cannot be started.
+    /// [`PictureError`] if ffmpeg cannot be started.
     pub fn look_for_ffmpeg() -> Result<(), PictureError> {
         let asked = Command::new("ffmpeg")
             .arg("-version")
@@ -193,8 +193,8 @@ fn not_started(error: std::io::Error) -> PictureError {
 
 /// The colours of a GIF, in order of appearance.
 ///
-/// There are few: robots look the same in every cell. Once the palette is full, text gets the
-/// nearest colours.
+/// A GIF needs few, because robots look the same in every cell. Once the palette is full, text gets
+/// the nearest colours.
 struct Palette {
     /// Red, green and blue of each colour; the first stands for unchanged pixels.
     colours: Vec<u8>,
@@ -275,7 +275,7 @@ struct Indexed {
 }
 
 impl Indexed {
-    /// The smallest rectangle with all changes; unchanged pixels in it are left out.
+    /// Returns the smallest rectangle with all changes; unchanged pixels in it are left out.
     fn changed_since(&self, before: Option<&Self>) -> Frame<'static> {
         let whole = Frame {
             width: self.width,
@@ -300,7 +300,7 @@ impl Indexed {
             (right, bottom) = (right.max(x + 1), bottom.max(y + 1));
         }
         if left >= right {
-            // Nothing changed; a frame has at least one pixel.
+            // Nothing changed, but a frame needs at least one pixel.
             (left, top, right, bottom) = (0, 0, 1, 1);
         }
         let inside = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));

@@ -1,4 +1,4 @@
-//! What the colours and marks of a picture mean.
+//! Legends: the meaning of a picture's colours and marks.
 
 use super::drawing::{Anchor, Drawing, Size};
 use super::style::Style;
@@ -8,10 +8,10 @@ use crate::recording::Recording;
 use crate::scene::{Colouring, Ink, Mark, Scene};
 use minimal_surprise_sim::damage::Damage;
 
-/// Width of a symbol before its meaning, in text heights.
+/// Width of a symbol in front of its meaning, in text heights.
 const SYMBOL: f64 = 1.6;
 
-/// What a colour or a mark means.
+/// Symbol of a legend entry.
 enum Key {
     Words,
     Robot(Ink),
@@ -19,7 +19,7 @@ enum Key {
     Area,
 }
 
-/// The meanings, in order.
+/// Entries of a legend, in order.
 pub(super) struct Legend {
     entries: Vec<(Key, String)>,
 }
@@ -34,7 +34,7 @@ const MARKS: [Mark; 6] = [
 ];
 
 impl Legend {
-    /// The legend of what the scenes show.
+    /// Creates the legend for the contents of the scenes.
     pub(super) fn of<'a>(
         scenes: impl IntoIterator<Item = &'a Scene>,
         colouring: Colouring,
@@ -54,7 +54,7 @@ impl Legend {
         )
     }
 
-    /// The legend of everything that can appear during the run.
+    /// Creates the legend for everything that can appear during the run.
     pub(super) fn whole(recording: &Recording, style: &Style) -> Self {
         let picked = style.robot.is_some();
         let last = style.colouring != Colouring::Surprise;
@@ -129,14 +129,14 @@ impl Legend {
         }
     }
 
-    /// Width of the widest entry.
+    /// Returns the width of the widest entry.
     pub(super) fn widest(&self, size: Size) -> f64 {
         let widths = self.entries.iter();
         let widths = widths.map(|entry| Self::entry_width(entry, size.words()));
         widths.fold(0.0, f64::max)
     }
 
-    /// Draws it in rows; returns where the last one ends.
+    /// Draws the legend in rows; returns the lower end of the last row.
     pub(super) fn draw(&self, drawing: &mut Drawing, (west, north): (f64, f64), width: f64) -> f64 {
         let theme = drawing.theme;
         let words = drawing.size.words();

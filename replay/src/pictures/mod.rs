@@ -1,7 +1,8 @@
 //! Pictures of a run: stills as SVG and PNG, animations as GIF and MP4.
 //!
-//! [`still`] turns a scene or a curve into a [`Drawing`], [`sheet()`] several of them; [`raster`] turns
-//! its SVG into pixels; [`film`] turns many of these into an animation.
+//! [`still`] turns a scene or a curve into a [`Drawing`], and [`sheet()`] turns several into one;
+//! [`raster`] turns the SVG of a drawing into pixels; [`film`] combines many pictures into an
+//! animation.
 
 mod curves;
 mod drawing;
@@ -23,7 +24,7 @@ pub use style::{PictureError, Style};
 use super::recording::Recording;
 use style::last_shown;
 
-/// What a still shows.
+/// Content of a still.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Picture {
@@ -31,18 +32,19 @@ pub enum Picture {
     State,
     /// The swarm before the damage and after it, as in the paper's Figs. 13 and 14.
     Damage,
-    /// What robots predict around them, averaged over the run, as in the paper's Fig. 9.
+    /// Average predictions of the robots over the run, as in the paper's Fig. 9.
     Predictions,
-    /// How many robots move, over the steps, as in the paper's Fig. 5.
+    /// Share of robots that move, over the steps, as in the paper's Fig. 5.
     Temperature,
     /// Best fitness over the generations of the evolution, as in the paper's Fig. 6.
     Fitness,
 }
 
-/// A still. `at` chooses the state of a swarm; the default is the last state with colours to show.
+/// Draws a still. `at` selects the state of a swarm; the default is the last state that the
+/// colouring can show.
 ///
 /// # Errors
-/// [`PictureError`] if the recording lacks what is asked for.
+/// [`PictureError`] if the recording lacks the requested data.
 pub fn still(
     recording: &Recording,
     what: Picture,

@@ -1,4 +1,4 @@
-//! What robots predict around them, averaged over the run, as in the paper's Fig. 9.
+//! The robots' predictions of their surroundings, averaged over the run, as in the paper's Fig. 9.
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, channels};
 use super::style::{PictureError, named};
@@ -9,14 +9,14 @@ use crate::recording::Recording;
 use crate::scene::Ink;
 use minimal_surprise_controller::SensorModel;
 
-/// Widest cell, in text heights: it has room for a number with two decimals.
+/// Maximum width of a cell, in text heights: a number with two decimals fits.
 pub(super) const CELL_MAX: f64 = 4.5;
 
-/// The average prediction in every sensor's cell; the robot faces up.
+/// Draws the average prediction in every sensor's cell; the robot faces up.
 ///
 /// # Errors
-/// [`PictureError::NoController`] of a trajectory; [`PictureError::TooNarrow`] if the title does
-/// not fit.
+/// [`PictureError::NoController`] if the recording is a trajectory; [`PictureError::TooNarrow`] if
+/// the title does not fit.
 pub(super) fn predictions(
     recording: &Recording,
     size: Size,
@@ -113,7 +113,7 @@ impl Surroundings<'_> {
     }
 }
 
-/// A colour between two others, as `#rrggbb`.
+/// Mixes two colours; returns `#rrggbb`.
 fn mixed(from: &str, to: &str, share: f64) -> String {
     let [from, to] = [from, to].map(channels);
     let mixed = [0, 1, 2].map(|channel| {

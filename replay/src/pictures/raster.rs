@@ -1,4 +1,4 @@
-//! Pictures as pixels.
+//! Conversion of drawings to pixels.
 
 use super::drawing::Drawing;
 use super::style::PictureError;
@@ -23,15 +23,15 @@ pub struct Pixels {
 }
 
 impl Pixels {
-    /// The drawing scaled to this width, in pixels.
+    /// Renders the drawing scaled to this width, in pixels.
     ///
     /// # Errors
-    /// [`PictureError::TooLarge`].
+    /// [`PictureError::TooLarge`] if the picture would have more than 64 million pixels.
     pub fn of(drawing: &Drawing, width: u32) -> Result<Self, PictureError> {
         let tree = Tree::from_str(&drawing.svg(), &Options::default())
             .map_err(|error| PictureError::Encoding(error.to_string()))?;
         let scale = f64::from(width) / f64::from(tree.size().width());
-        // Only rows that are covered completely: a partial row would be translucent.
+        // A partially covered last row would be translucent, so it is left out.
         let height = (f64::from(tree.size().height()) * scale).floor().max(1.0);
         let too_large = PictureError::TooLarge {
             width: f64::from(width),
@@ -61,19 +61,19 @@ impl Pixels {
         })
     }
 
-    /// A drawing of [`super::Size::Screen`] at its own size, in pixels.
+    /// Renders a drawing of [`super::Size::Screen`] at its own size, in pixels.
     ///
     /// # Errors
-    /// [`PictureError::TooLarge`].
+    /// [`PictureError::TooLarge`] if the picture would have more than 64 million pixels.
     pub fn of_screen(drawing: &Drawing) -> Result<Self, PictureError> {
         Self::of(drawing, drawing.width().ceil() as u32)
     }
 }
 
-/// A drawing of [`super::Size::Paper`] as PNG with this resolution.
+/// Encodes a drawing of [`super::Size::Paper`] as PNG with this resolution.
 ///
 /// # Errors
-/// [`PictureError::TooLarge`].
+/// [`PictureError::TooLarge`] if the picture would have more than 64 million pixels.
 pub fn png(drawing: &Drawing, dots_per_inch: u32) -> Result<Vec<u8>, PictureError> {
     let dots = f64::from(dots_per_inch);
     let pixels = Pixels::of(drawing, (drawing.width() / INCH * dots).round() as u32)?;

@@ -1,4 +1,5 @@
-//! A swarm, or two side by side: every robot an arrow in its cell, with the marked cells.
+//! Pictures of one swarm, or two side by side: every robot is an arrow in its cell, with the marked
+//! cells.
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, line};
 use super::legend::Legend;
@@ -20,7 +21,7 @@ struct Panel {
 /// Text above a swarm.
 struct Caption {
     words: String,
-    /// The longest text during the run: the space to reserve.
+    /// The longest text during the run, which determines the reserved space.
     longest: String,
 }
 
@@ -49,7 +50,7 @@ impl Caption {
     }
 }
 
-/// State `t`.
+/// Draws state `t`.
 pub(super) fn state(
     recording: &Recording,
     t: usize,
@@ -60,7 +61,7 @@ pub(super) fn state(
     of_state(recording, t, style, scene, &legend)
 }
 
-/// State `t` as a frame: all frames have the same legend and size.
+/// Draws state `t` as a frame: all frames have the same legend and size.
 pub(super) fn frame(
     recording: &Recording,
     t: usize,
@@ -91,7 +92,7 @@ fn of_state(
     panels(&title, &[panel], legend, style)
 }
 
-/// The swarm before the damage, and state `t` after it.
+/// Draws the swarm before the damage, and state `t` after it.
 pub(super) fn damage(
     recording: &Recording,
     t: usize,
@@ -149,8 +150,8 @@ fn scene(recording: &Recording, t: usize, style: &Style) -> Result<Scene, Pictur
     Ok(Scene::of(recording, t, style.colouring, style.robot))
 }
 
-/// Width of a panel and side of a cell. On a screen, the cells determine the size of the picture;
-/// on paper, the width of the picture determines the size of the cells.
+/// Returns the width of a panel and the side of a cell. On a screen, the cells determine the size
+/// of the picture; on paper, the width of the picture determines the size of the cells.
 fn layout(
     panels: &[Panel],
     legend: &Legend,
@@ -184,7 +185,7 @@ fn layout(
     }
 }
 
-/// Columns of the widest and rows of the highest panel.
+/// Returns the columns of the widest panel and the rows of the highest.
 fn cells(panels: &[Panel]) -> (f64, f64) {
     let most = |of: fn(&Scene) -> u16| {
         let sides = panels.iter().map(|panel| f64::from(of(&panel.scene)));
@@ -249,7 +250,7 @@ pub(super) fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f
     let (width, height) = (f64::from(scene.width), f64::from(scene.height));
     let (east, south) = (west + width * side, north + height * side);
     drawing.area((west, north), (east - west, south - north), theme.cell);
-    // The grid counts rows from the south, pictures from the north.
+    // Grid rows count from the south, picture rows from the north.
     let corner = |x: u16, y: u16| {
         (
             west + f64::from(x) * side,
@@ -300,7 +301,7 @@ pub(super) fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f
     area(drawing, scene, corner, side);
 }
 
-/// The outline of the damaged cells; open where the area continues across the edge.
+/// Draws the outline of the damaged cells; open where the area continues across the edge.
 fn area(drawing: &mut Drawing, scene: &Scene, corner: impl Fn(u16, u16) -> (f64, f64), side: f64) {
     let is_inside = |x: u16, y: u16| scene.area.contains(&[x % scene.width, y % scene.height]);
     let mut outline = Data::new();

@@ -1,4 +1,4 @@
-//! What all pictures share: their style, what can be wrong with them, and their words for a run.
+//! Common parts of all pictures: style, errors, and the names of a run's structures.
 
 use super::drawing::Size;
 use crate::palette::Theme;
@@ -6,27 +6,27 @@ use crate::recording::Recording;
 use crate::scene::Colouring;
 use std::io;
 
-/// How a swarm is drawn.
+/// Style of a swarm's picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Style {
-    /// How large it is.
+    /// Size of the picture.
     pub size: Size,
-    /// Its colours, for a light or dark background.
+    /// Colours for a light or dark background.
     pub theme: &'static Theme,
-    /// What the colours of robots show.
+    /// Meaning of the robots' colours.
     pub colouring: Colouring,
     /// The selected robot.
     pub robot: Option<usize>,
 }
 
-/// A picture could not be made.
+/// Error: a picture could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PictureError {
     /// The recording has no such state.
     #[error("there is no state {asked}; states are 0 to {last}")]
     NoState {
-        /// The state asked for.
+        /// The requested state.
         asked: u32,
         /// The last state.
         last: usize,
@@ -34,7 +34,7 @@ pub enum PictureError {
     /// The recording has no such robot.
     #[error("there is no robot {asked}; robots are 0 to {last}")]
     NoRobot {
-        /// The robot asked for.
+        /// The requested robot.
         asked: usize,
         /// The last robot.
         last: usize,
@@ -44,19 +44,19 @@ pub enum PictureError {
         "a trajectory has poses only; give a run or a genome to show what robots sense and predict"
     )]
     NoController,
-    /// The recording is not of a run directory, so no evolution is known.
+    /// The recording was not made from a run directory, so no evolution is known.
     #[error("only a run directory records how fitness evolved")]
     NoEvolution,
-    /// Nothing was damaged.
+    /// The swarm was not damaged.
     #[error("nothing was damaged; damage an area with --remove or --reposition")]
     NoDamage,
-    /// Text would be cut off or overlap.
+    /// Text would be truncated or overlap.
     #[error("the text of this picture needs {needed} mm")]
     TooNarrow {
-        /// Least width, in millimetres.
+        /// Minimum width, in millimetres.
         needed: u32,
     },
-    /// More pixels than a picture can have.
+    /// The picture would have too many pixels.
     #[error("{width} x {height} pixels are too many; a picture has 64 million at most")]
     TooLarge {
         /// Pixels per row.
@@ -81,7 +81,7 @@ pub enum PictureError {
     FfmpegFailed(String),
 }
 
-/// The last state whose colours show something: in the final state nothing is sensed.
+/// Returns the last state whose colours have a meaning: in the final state, robots sense nothing.
 pub(super) fn last_shown(recording: &Recording, colouring: Colouring) -> usize {
     match colouring {
         Colouring::Surprise => recording.steps().saturating_sub(1),
@@ -89,7 +89,7 @@ pub(super) fn last_shown(recording: &Recording, colouring: Colouring) -> usize {
     }
 }
 
-/// The run's dominant structures.
+/// Returns the names of the run's dominant structures.
 pub(super) fn named(recording: &Recording) -> String {
     let names: Vec<&str> = recording.names.iter().map(|name| name.name()).collect();
     if names.is_empty() {

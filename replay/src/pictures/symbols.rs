@@ -1,4 +1,4 @@
-//! Robots and marks, each in a cell given by its north-west corner and side.
+//! Symbols for robots and marks, each in a cell given by its north-west corner and side.
 
 use super::drawing::{Drawing, Stroke, line, polygon};
 use crate::palette::{ARROW, is_hollow};
@@ -6,7 +6,7 @@ use crate::scene::{Ink, Mark};
 use std::f64::consts::TAU;
 use svg::node::element::path::Data;
 
-/// A robot.
+/// Draws a robot.
 pub(super) fn arrow(drawing: &mut Drawing, corner: (f64, f64), side: f64, heading: u8, ink: Ink) {
     let outline = outline(corner, side, heading);
     let colour = drawing.theme.ink(ink);
@@ -21,7 +21,7 @@ pub(super) fn arrow(drawing: &mut Drawing, corner: (f64, f64), side: f64, headin
     }
 }
 
-/// Separates a robot from a mark under it, which may have the same colour.
+/// Draws a border that separates a robot from a mark under it, which may have the same colour.
 pub(super) fn set_off(drawing: &mut Drawing, corner: (f64, f64), side: f64, heading: u8) {
     let outline = outline(corner, side, heading);
     let colour = drawing.theme.cell;
@@ -46,7 +46,7 @@ fn outline((west, north): (f64, f64), side: f64, heading: u8) -> Data {
     }))
 }
 
-/// A mark. Marks lie under the robots so that headings stay visible.
+/// Draws a mark. Marks lie under the robots so that headings stay visible.
 pub(super) fn mark(drawing: &mut Drawing, mark: Mark, (west, north): (f64, f64), side: f64) {
     let colour = drawing.theme.mark(mark);
     let stroke = |share: f64| Stroke {
@@ -71,7 +71,7 @@ pub(super) fn mark(drawing: &mut Drawing, mark: Mark, (west, north): (f64, f64),
     }
 }
 
-/// A cross to the corners of a cell, which the robot's arrow does not cover.
+/// Draws a cross to the corners of a cell, which the robot's arrow does not cover.
 fn cross(drawing: &mut Drawing, (west, north): (f64, f64), side: f64, stroke: Stroke<'_>) {
     let (near, far) = (0.06 * side, 0.94 * side);
     let mut cross = line(&[(west + near, north + near), (west + far, north + far)]);
@@ -90,7 +90,7 @@ pub(super) fn area_stroke(drawing: &Drawing, side: f64) -> Stroke<'static> {
     }
 }
 
-/// A circle, as a polygon that looks round at this size.
+/// Returns a circle, as a polygon that looks round at this size.
 fn ring((west, north): (f64, f64), side: f64, radius: f64) -> Data {
     const CORNERS: u32 = 24;
     let corners = (0..CORNERS).map(|corner| {
@@ -103,7 +103,7 @@ fn ring((west, north): (f64, f64), side: f64, radius: f64) -> Data {
     polygon(&corners.collect::<Vec<_>>())
 }
 
-/// A square that leaves this share of the cell free on each side.
+/// Returns a square that leaves this share of the cell free on each side.
 pub(super) fn square((west, north): (f64, f64), side: f64, inset: f64) -> Data {
     let (near, far) = (inset * side, (1.0 - inset) * side);
     polygon(&[

@@ -1,4 +1,4 @@
-//! Text as outlines, in the bundled font: a picture looks the same everywhere, whatever fonts are
+//! Text as outlines in the bundled font, so that a picture looks the same whichever fonts are
 //! installed.
 
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ static FONT: LazyLock<Font> = LazyLock::new(|| {
     font.expect("the bundled font is well-formed")
 });
 
-/// Lengths are in font units, y upwards.
+/// Outlines of a font. Lengths are in font units, y upwards.
 struct Font {
     units_per_em: f64,
     letters: BTreeMap<char, Letter>,
@@ -39,7 +39,7 @@ impl Font {
         })
     }
 
-    /// The letter; a question mark if the font lacks it.
+    /// Returns a letter; a question mark if the font lacks it.
     fn letter(&self, letter: char) -> &Letter {
         let found = self.letters.get(&letter);
         found.unwrap_or_else(|| &self.letters[&'?'])
@@ -50,16 +50,16 @@ impl Font {
     }
 }
 
-/// Height of capitals and digits, as a share of the font size.
+/// Height of capitals and digits, relative to the font size.
 pub(super) const CAPITALS: f64 = 0.727;
 
-/// Width of a text at this font size.
+/// Returns the width of a text at this font size.
 pub(super) fn width(words: &str, size: f64) -> f64 {
     let advances = words.chars().map(|letter| FONT.letter(letter).advance);
     advances.sum::<f64>() * FONT.scale(size)
 }
 
-/// The outlines of a text that starts at `x` with its baseline at `y`.
+/// Returns the outlines of a text that starts at `x` with its baseline at `y`.
 pub(super) fn outlines(words: &str, size: f64, (mut x, y): (f64, f64)) -> Data {
     let scale = FONT.scale(size);
     let mut data = Data::new();
@@ -87,7 +87,7 @@ pub(super) fn outlines(words: &str, size: f64, (mut x, y): (f64, f64)) -> Data {
     data
 }
 
-/// Lengths have three decimals; more would only make the file longer.
+/// Rounds a length to three decimals; more would only make the file larger.
 pub(super) fn rounded(length: f64) -> f32 {
     // Turns negative zero into zero.
     ((length * 1000.0).round() / 1000.0 + 0.0) as f32

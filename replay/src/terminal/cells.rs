@@ -12,14 +12,14 @@ use std::ops::Range;
 /// Columns per cell.
 pub const COLUMNS: u16 = 2;
 
-/// Shades the damaged area.
+/// Character that shades the damaged area.
 pub const AREA: char = '░';
 
-/// Stands beside a robot of the highest level of surprise, for which there is no larger arrow.
+/// Character next to a robot with the highest level of surprise, for which no larger arrow exists.
 pub const MOST_SURPRISED: char = '!';
 
-/// The arrow of a robot: small for structures other than the dominant one, hollow for none; larger
-/// the more surprised the robot is.
+/// Returns the arrow of a robot: small for structures other than the dominant one, hollow for no
+/// structure; larger with increasing surprise.
 #[must_use]
 pub fn robot(robot: Robot) -> char {
     let heading = Heading::ALL[usize::from(robot.heading) % Heading::ALL.len()];
@@ -39,8 +39,8 @@ fn small_arrow(heading: Heading) -> char {
     }
 }
 
-/// Squares mark hits, crosses misses, rings cells not yet sensed; filled or thick where there is a
-/// robot.
+/// Returns the character of a mark: squares for hits, crosses for misses, rings for cells not yet
+/// sensed; filled or thick where there is a robot.
 #[must_use]
 pub fn mark(mark: Mark) -> char {
     match mark {
@@ -67,7 +67,7 @@ pub fn lines(scene: &Scene, x: Range<u16>, y: Range<u16>, paints: Paints) -> Vec
         let cell = &mut cells[at(drawn.x, drawn.y)];
         let mut style = paints.ink(drawn.ink);
         if scene.picked == Some(index) {
-            // In the terminal's own colours: a coloured background would hide the arrow.
+            // Uses the terminal's own colours: a coloured background would hide the arrow.
             style = Style::new().bold().reversed();
             cell[0] = (' ', style);
         }

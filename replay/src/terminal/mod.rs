@@ -1,7 +1,7 @@
 //! Replays in the terminal: one state at a time, controlled by keys.
 //!
-//! [`player`] holds what the keys change; [`screen`] draws it with the characters of [`cells`] and
-//! the colours of [`paints`].
+//! [`player`] holds the state controlled by the keys; [`screen`] draws it with the characters of
+//! [`cells`] and the colours of [`paints`].
 
 pub mod cells;
 pub mod paints;
@@ -18,17 +18,17 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Longest wait for a key before checking whether to end.
+/// Maximum wait for a key before checking `stop`.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Shortest wait: without it, keys would never be read where drawing is slow.
+/// Minimum wait: without it, slow drawing would prevent keys from being read.
 const A_LOOK: Duration = Duration::from_millis(1);
 
-/// Plays a recording until a key or `stop` ends it; in ASCII if the terminal's locale supports
-/// nothing else. Restores the terminal afterwards, even after a panic.
+/// Plays a recording until a key or `stop` ends it; uses ASCII if the terminal's locale does not
+/// support UTF-8. Restores the terminal afterwards, even after a panic.
 ///
 /// # Errors
-/// If there is no terminal, or it is closed.
+/// If standard output is not a terminal, or the terminal is closed.
 pub fn play(
     recording: &Recording,
     colouring: Colouring,
@@ -39,7 +39,7 @@ pub fn play(
     let mut player = Player::new(recording, colouring);
     let played = ratatui::try_init()
         .and_then(|mut terminal| watch(&mut terminal, &mut player, paints, ascii, stop));
-    // Even if setting it up failed halfway.
+    // Also if the setup failed halfway.
     let restored = ratatui::try_restore();
     played.and(restored)
 }
@@ -53,8 +53,8 @@ fn watch(
 ) -> io::Result<()> {
     let mut last = Instant::now();
     while !stop.load(Ordering::Relaxed) {
-        // Draws even if nothing has happened: a resize before the first event is noticed here. Only
-        // cells that differ are written.
+        // Draws even without an event: a resize before the first event is detected here. Only
+        // changed cells are written.
         terminal.draw(|frame| {
             screen::draw(frame, player, paints);
             if ascii {

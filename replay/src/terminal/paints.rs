@@ -1,19 +1,19 @@
 //! Colours for terminals with an unknown background: readable on light and dark, in as many colours
-//! as the terminal has.
+//! as the terminal supports.
 
 use crate::palette::{LIGHT, Theme};
 use crate::scene::{Ink, Mark};
 use anstyle::RgbColor;
 use ratatui::style::{Color, Modifier, Style};
 
-/// The hues for a light background are dark enough for it and light enough for a dark one. Instead
-/// of the theme's greys, the terminal's own text colour is used.
+/// The hues for a light background are readable on light and dark. The terminal's own text colour
+/// replaces the theme's greys.
 const HUES: Theme = LIGHT;
 
-/// How many colours to use.
+/// Number of colours to use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Paints {
-    /// None.
+    /// No colours.
     None,
     /// The 16 basic colours, which the user's terminal defines.
     Sixteen,
@@ -36,25 +36,25 @@ impl Paints {
         Style::new().fg(colour)
     }
 
-    /// The hue of the dominant structure.
+    /// Returns the hue of the dominant structure.
     #[must_use]
     pub fn named(self) -> Style {
         self.paint(HUES.named, Color::Cyan)
     }
 
-    /// The hue of other structures.
+    /// Returns the hue of other structures.
     #[must_use]
     pub fn other(self) -> Style {
         self.paint(HUES.other, Color::Yellow)
     }
 
-    /// The hue of correct predictions.
+    /// Returns the hue of correct predictions.
     #[must_use]
     pub fn hit(self) -> Style {
         self.paint(HUES.hit, Color::Green)
     }
 
-    /// The style of a robot.
+    /// Returns the style of a robot.
     #[must_use]
     pub fn ink(self, ink: Ink) -> Style {
         match ink {
@@ -68,7 +68,7 @@ impl Paints {
         }
     }
 
-    /// The style of a mark.
+    /// Returns the style of a mark.
     #[must_use]
     pub fn mark(self, mark: Mark) -> Style {
         let of_sixteen = match mark {
@@ -79,20 +79,20 @@ impl Paints {
         self.paint(HUES.mark(mark), of_sixteen).bold()
     }
 
-    /// The style of the damaged area.
+    /// Returns the style of the damaged area.
     #[must_use]
     pub fn area(self) -> Style {
         self.paint(HUES.expects, Color::Magenta)
     }
 
-    /// The style of warnings.
+    /// Returns the style of warnings.
     #[must_use]
     pub fn warning(self) -> Style {
         self.paint(HUES.miss, Color::Red).bold()
     }
 }
 
-/// The style of secondary text.
+/// Returns the style of secondary text.
 #[must_use]
 pub fn soft() -> Style {
     Style::new().add_modifier(Modifier::DIM)

@@ -1,4 +1,4 @@
-//! What is shown of a recording, and the keys that change it.
+//! State of the display of a recording, and the keys that change it.
 
 use crate::recording::Recording;
 use crate::scene::{Colouring, Scene};
@@ -6,42 +6,42 @@ use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use std::ops::Range;
 use std::time::Duration;
 
-/// Speeds to choose from, in steps per second.
+/// Available speeds, in steps per second.
 pub const SPEEDS: [u32; 8] = [1, 2, 5, 10, 20, 50, 100, 200];
 
-/// Steps per jump.
+/// Number of steps per jump.
 pub const JUMP: usize = 10;
 
-/// Cells that a key scrolls the view by.
+/// Number of cells by which a key scrolls the view.
 const SCROLL: i32 = 5;
 
-/// Cells around a robot that stay in view: no sensor reaches farther.
+/// Number of cells around a robot that stay in view: no sensor reaches farther.
 const MARGIN: u16 = 3;
 
-/// Plays a recording.
+/// Playback state of a recording.
 #[derive(Clone, Debug)]
 pub struct Player<'a> {
     /// The recording.
     pub recording: &'a Recording,
-    /// The state that is shown, 0 to T.
+    /// The displayed state, 0 to T.
     pub t: usize,
-    /// Whether it is playing.
+    /// True while the recording is playing.
     pub playing: bool,
-    /// Whether the swarm before the damage is shown.
+    /// True if the swarm before the damage is shown.
     pub before: bool,
-    /// What the colours of robots show.
+    /// Meaning of the robots' colours.
     pub colouring: Colouring,
     /// The selected robot.
     pub picked: Option<usize>,
     speed: usize,
     /// The south-west cell of the view, if the view does not show the whole grid.
     corner: [u16; 2],
-    /// Whether the view follows the selected robot.
+    /// True if the view follows the selected robot.
     following: bool,
 }
 
 impl<'a> Player<'a> {
-    /// Paused at the start.
+    /// Creates a player that is paused at the start.
     #[must_use]
     pub fn new(recording: &'a Recording, colouring: Colouring) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl<'a> Player<'a> {
         }
     }
 
-    /// The scene to draw.
+    /// Returns the scene to draw.
     #[must_use]
     pub fn scene(&self) -> Scene {
         match &self.recording.origin.damage {
@@ -68,25 +68,25 @@ impl<'a> Player<'a> {
         }
     }
 
-    /// Steps per second.
+    /// Returns the speed in steps per second.
     #[must_use]
     pub fn speed(&self) -> u32 {
         SPEEDS[self.speed]
     }
 
-    /// Time from one step to the next; `None` while paused.
+    /// Returns the time from one step to the next; `None` while paused.
     #[must_use]
     pub fn pause(&self) -> Option<Duration> {
         self.playing.then(|| Duration::from_secs(1) / self.speed())
     }
 
-    /// Plays one more step, and pauses at the last.
+    /// Advances by one step, and pauses at the last.
     pub fn go_on(&mut self) {
         self.t = (self.t + 1).min(self.recording.steps());
         self.playing = self.t < self.recording.steps();
     }
 
-    /// Handles a key; returns whether to quit.
+    /// Handles a key; returns true if the player should quit.
     pub fn key(&mut self, key: KeyEvent) -> bool {
         if key.kind == KeyEventKind::Release {
             return false;
@@ -136,7 +136,7 @@ impl<'a> Player<'a> {
         self.before = false;
     }
 
-    /// Selects the next or previous robot; at first, the first or last.
+    /// Selects the next or previous robot; if none is selected, the first or last.
     fn pick(&mut self, by: i64) {
         let robots = self.recording.robots() as i64;
         let from = self.picked.map_or(by.min(0), |robot| robot as i64 + by);
@@ -144,7 +144,7 @@ impl<'a> Player<'a> {
         self.following = true;
     }
 
-    /// The next colouring; trajectories have no surprise.
+    /// Returns the next colouring; trajectories have no surprise.
     fn next_colouring(&self) -> Colouring {
         match self.colouring {
             Colouring::Structure if self.recording.controller.is_some() => Colouring::Surprise,
@@ -159,7 +159,7 @@ impl<'a> Player<'a> {
         self.following = false;
     }
 
-    /// The columns and rows of cells that a view of this size shows, including a followed robot.
+    /// Returns the columns and rows of cells in a view of this size, including a followed robot.
     pub fn view(&mut self, columns: u16, rows: u16) -> [Range<u16>; 2] {
         let grid = self.recording.grid;
         let poses = self.recording.poses(self.t);

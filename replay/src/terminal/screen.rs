@@ -1,4 +1,4 @@
-//! The screen: the run, the swarm, details beside it, the time, the keys.
+//! Screen layout: the run, the swarm with details beside it, the time, the keys.
 
 use super::cells::{self, COLUMNS};
 use super::paints::{Paints, soft};
@@ -18,7 +18,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{LineGauge, Sparkline, SparklineBar};
 use std::path::Path;
 
-/// Fewest columns for the details beside the swarm.
+/// Minimum number of columns for the details beside the swarm.
 const PANEL: u16 = 34;
 
 /// Maximum number of columns for the details.
@@ -27,13 +27,13 @@ const WIDE_PANEL: u16 = 64;
 /// Maximum number of rows of details.
 const PANEL_ROWS: u16 = 24;
 
-/// Columns between the swarm and the details.
+/// Number of columns between the swarm and the details.
 const GAP: u16 = 3;
 
 /// The value of a full bar.
 const FULL: f64 = 1000.0;
 
-/// The keys of every replay.
+/// Keys available in every replay.
 const KEYS: [(&str, &str); 8] = [
     ("q", "quit"),
     ("space", "play"),
@@ -48,7 +48,7 @@ const KEYS: [(&str, &str); 8] = [
 /// Draws everything.
 pub fn draw(frame: &mut Frame<'_>, player: &mut Player<'_>, paints: Paints) {
     let scene = player.scene();
-    // In a low window the swarm takes precedence, then the time.
+    // In a low window, the swarm takes precedence, then the time.
     let low = frame.area().height < 8;
     let [title, middle, crop, time, keys] =
         block(frame.area(), &scene).layout(&Layout::vertical([
@@ -88,7 +88,7 @@ pub fn draw(frame: &mut Frame<'_>, player: &mut Player<'_>, paints: Paints) {
     draw_keys(frame, keys);
 }
 
-/// Replaces what a terminal without UTF-8 cannot show, cell by cell.
+/// Replaces characters that a terminal without UTF-8 cannot show, cell by cell.
 pub fn to_ascii(buffer: &mut Buffer) {
     for cell in &mut buffer.content {
         if !cell.symbol().is_ascii() {
@@ -98,7 +98,8 @@ pub fn to_ascii(buffer: &mut Buffer) {
     }
 }
 
-/// The part of the window that is used, so that the parts of the screen stay close together.
+/// Returns the used part of the window, limited so that the parts of the screen stay close
+/// together.
 fn block(window: Rect, scene: &Scene) -> Rect {
     let columns = COLUMNS.saturating_mul(scene.width);
     Rect {
@@ -110,12 +111,12 @@ fn block(window: Rect, scene: &Scene) -> Rect {
     }
 }
 
-/// Where the swarm, the details and the note on cropping are drawn. The details are left out where
-/// the whole swarm fits only without them.
+/// Returns the areas of the swarm, the details and the note on cropping. The details are left out
+/// if the whole swarm fits only without them.
 fn sides(scene: &Scene, middle: Rect, crop: Rect) -> (Rect, Option<Rect>, Option<Rect>) {
     let columns = COLUMNS.saturating_mul(scene.width);
     let rows = scene.height;
-    // The line of the note can be the swarm's last.
+    // The line of the note can be used as the swarm's last line.
     let whole = Rect {
         height: middle.height + crop.height,
         ..middle
@@ -186,7 +187,7 @@ fn draw_title(frame: &mut Frame<'_>, area: Rect, player: &Player<'_>, paints: Pa
     }
 }
 
-/// The first digits of a hash.
+/// Returns the first digits of a hash.
 fn short(hash: &str) -> &str {
     hash.get(..8).unwrap_or(hash)
 }
@@ -198,7 +199,7 @@ fn spaced(parts: Vec<Span<'static>>, space: &'static str) -> Line<'static> {
     line
 }
 
-/// The value after the step that led to state `t`.
+/// Returns the value after the step that led to state `t`.
 fn so_far(values: &[f64], t: usize) -> Option<f64> {
     values.get(t.checked_sub(1)?).copied()
 }
@@ -240,7 +241,7 @@ fn draw_panel(
     }
 }
 
-/// A value over time.
+/// A chart of a value over time.
 struct Chart {
     label: String,
     now: String,
@@ -289,7 +290,8 @@ fn charts(recording: &Recording, t: usize, paints: Paints) -> Vec<Chart> {
 }
 
 impl Chart {
-    /// A column shows the mean of its states, or several columns show one; future states are faint.
+    /// Draws the bars: each column shows the mean of its states, or several columns show one state;
+    /// future states are faint.
     fn bars(&self, columns: u16, player: &Player<'_>) -> Sparkline<'static> {
         let states = self.values.len();
         let columns = usize::from(columns);
@@ -329,7 +331,7 @@ fn damage(player: &Player<'_>, paints: Paints) -> Vec<Line<'static>> {
     ]
 }
 
-/// The selected robot, and the key to its marks.
+/// Describes the selected robot and explains its marks.
 fn picked(player: &Player<'_>, scene: &Scene, paints: Paints) -> Vec<Line<'static>> {
     let Some((robot, at)) = scene.picked.and_then(|robot| {
         let at = scene.robots.get(robot)?;
@@ -379,7 +381,7 @@ fn picked(player: &Player<'_>, scene: &Scene, paints: Paints) -> Vec<Line<'stati
     lines
 }
 
-/// Returns what the arrows mean.
+/// Explains the arrows.
 fn legend(player: &Player<'_>, paints: Paints) -> Vec<Line<'static>> {
     let arrow = |ink| {
         let (x, y, heading) = (0, 0, Heading::East as u8);
@@ -462,7 +464,8 @@ mod tests {
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
 
-    /// A pair facing east and west, a robot driving north, and one that turns.
+    /// Returns a recording with a pair facing east and west, a robot driving north, and one that
+    /// turns.
     fn recording() -> Recording {
         let states = [
             "2, 3, 1, 0|3, 3, -1, 0|0, 0, 0, 1|5, 1, 0, -1",
