@@ -1,9 +1,9 @@
 #!/bin/sh
 # Runs all tests: ./test.sh, or ./test.sh --all to include the long ones.
 #
-# Installs the tools it needs (a C linker, the thumbv7em targets, QEMU, Chromium, GNU parallel,
-# rustfmt and clippy; for --all also Slurm) and announces this. Needs Rust and, if a tool is
-# missing, Debian's apt-get as root or by sudo.
+# Installs missing tools (a C linker, the thumbv7em targets, QEMU, Chromium, GNU parallel, rustfmt
+# and clippy; for --all also Slurm) and prints what it installs. Needs Rust and, if a tool is
+# missing, Debian's apt-get as root or with sudo.
 set -eu
 cd "$(dirname "$0")"
 
@@ -15,7 +15,7 @@ esac
 
 # CI as set by the caller, before it is overwritten below: if true, no step may be skipped.
 strict=${CI:-}
-# A test that lacks a tool fails instead of being skipped.
+# If a tool is missing, its tests fail instead of being skipped.
 export CI=true
 
 started=$(date +%s)
@@ -70,7 +70,7 @@ for target in $targets; do
     if RUSTUP_TARGET_ADD=0 scripts/thumb-cargo.sh --compiler --target "$target" 2>&1 |
         grep -q 'from its source'; then
         core_from_source=1
-        # rustup has just failed; without a network, each further attempt would wait for a time-out.
+        # rustup has just failed; without a network, each attempt waits for a time-out.
         export RUSTUP_TARGET_ADD=0
     fi
 done
@@ -156,7 +156,7 @@ if [ -n "${TEST_ALL:-}" ]; then
         cargo deny --manifest-path $manifest --config deny.toml check licenses bans sources
     done
     if cargo deny fetch db; then
-        # fuzz/ is locked by scripts/fuzz.sh to the root's dependencies and libFuzzer.
+        # scripts/fuzz.sh locks fuzz/ to the root's dependencies and libFuzzer.
         for manifest in Cargo.toml firmware-example/Cargo.toml fuzz/Cargo.toml; do
             cargo deny --manifest-path $manifest --config deny.toml check advisories
         done

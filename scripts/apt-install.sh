@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs Debian packages, as root or by sudo: scripts/apt-install.sh PACKAGE…
+# Installs Debian packages, as root or with sudo: scripts/apt-install.sh PACKAGE…
 set -eu
 
 if [ "$(id -u)" = 0 ]; then

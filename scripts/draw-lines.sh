@@ -1,9 +1,9 @@
 #!/bin/sh
-# Draws lines of comments, messages and documents, to be read for plain English:
+# Draws random lines of comments, messages and documents, for a review of their English:
 #
 #     scripts/draw-lines.sh [SEED [NUMBER]]      default: seed 1, 300 lines
 #
-# The same seed draws the same lines of the same revision.
+# For the same revision, the same seed draws the same lines.
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -22,7 +22,7 @@ while [ "$shard" -lt "$shards" ]; do
         cargo mutants --package minimal-surprise-controller --package minimal-surprise-slots \
             --package minimal-surprise-link --shard "$shard/$shards" --sharding round-robin \
             --output "$this" || status=$?
-        # 2: mutants survived. 3: tests timed out, which counts as caught.
+        # Exit codes: 2 if mutants survived, 3 if tests timed out, which counts as caught.
         case $status in
             0 | 2 | 3) touch "$this/complete" ;;
             *) exit "$status" ;;

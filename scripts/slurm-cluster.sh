@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
-# Runs a Slurm cluster of three one-core nodes on this machine for tests: as root, on loopback only,
-# without systemd and cgroups.
+# Runs a Slurm cluster of three one-core nodes on this machine, for tests: as root, on loopback
+# only, without systemd and cgroups.
 #
 #   scripts/slurm-cluster.sh DIR PORT PORT PORT PORT
 #
-# DIR is created and holds all files; the ports (of the controller and the nodes) must be free.
+# DIR is created and contains all files; the ports (of the controller and the nodes) must be free.
 # Prints "up" once the nodes are idle: then use the cluster with SLURM_CONF=DIR/slurm.conf. Reads
-# commands from standard input: "kill n2" ends a node and its jobs at once, "start n2" restarts it;
-# the reply to each is "done". When standard input ends, the cluster ends, so that nothing outlives
-# a test that was killed.
+# commands from standard input: "kill n2" kills a node and its jobs, "start n2" restarts the node;
+# the reply to each is "done". The cluster stops when standard input ends, so that no process
+# outlives a test that was killed.
 set -eu
 
 [ $# = 5 ] || { echo "usage: $0 DIR PORT PORT PORT PORT" >&2 && exit 2; }
-# Slurm looks up the host name at every step, and waits long if it cannot be resolved.
+# Slurm resolves the host name at every step, and waits long if this fails.
 if ! getent hosts "$(hostname -s)" >/dev/null; then
     echo "$0: unknown host $(hostname -s): expected a line for 127.0.0.1 in /etc/hosts" >&2
     exit 1
@@ -24,14 +24,14 @@ shift 2
 nodes='n1 n2 n3'
 host=$(hostname -s)
 conf=$dir/slurm.conf
-# Not exported: the processes that end the cluster would look like a part of it.
+# Not exported: otherwise, the processes that stop the cluster would count as part of it.
 unset SLURM_CONF
 
-# The processes of this cluster and its jobs: they inherit SLURM_CONF from the daemons.
+# Lists the processes of this cluster and its jobs, which inherit SLURM_CONF from the daemons.
 all() { grep -lzxF "SLURM_CONF=$conf" /proc/[0-9]*/environ 2>/dev/null | cut -d/ -f3; }
 
-# The processes of a node: its daemons run in its spool folder, its jobs have its name in the
-# environment.
+# Lists the processes of a node: its daemons run in its spool folder, and its jobs have its name in
+# the environment.
 of_node() {
     for pid in $(all); do
         if [ "$(readlink "/proc/$pid/cwd")" = "$dir/spool-$1" ] ||
@@ -41,7 +41,7 @@ of_node() {
     done
 }
 
-# Kills the listed processes, and any that they start meanwhile.
+# Kills the processes listed by a command, and any that they start in the meantime.
 end() {
     while pids=$("$@") && [ -n "$pids" ]; do
         # shellcheck disable=SC2086 # one word per process
@@ -57,7 +57,7 @@ run() {
     log=$dir/log/$1
     shift
     SLURM_CONF=$conf "$@" >>"$log" 2>&1 </dev/null &
-    # Otherwise the shell would report that it was killed.
+    # Otherwise, the shell would report the process as killed.
     disown
 }
 
@@ -82,7 +82,7 @@ until_true() {
 all_idle() { [ "$(SLURM_CONF=$conf sinfo --noheader --Node --format=%T 2>/dev/null | grep -cx idle)" = 3 ]; }
 
 mkdir "$dir"/{log,state,munge}
-# munged requires that everyone can reach its socket and nobody its key.
+# munged requires that everyone can access its socket, and nobody else its key.
 chmod 755 "$dir"
 chmod 700 "$dir/munge"
 (umask 077 && head -c 1024 /dev/urandom >"$dir/munge/key")
@@ -102,7 +102,7 @@ StateSaveLocation=$dir/state
 SlurmdSpoolDir=$dir/spool-%n
 SlurmctldPidFile=$dir/controller.pid
 SlurmdPidFile=$dir/%n.pid
-# Nothing that needs a cgroup, a database or MPI.
+# No plugins that need a cgroup, a database or MPI.
 ProctrackType=proctrack/linuxproc
 TaskPlugin=task/none
 JobAcctGatherType=jobacct_gather/none
@@ -111,14 +111,14 @@ SwitchType=switch/none
 MpiDefault=none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_Core
-# One core each, whatever this machine has.
+# One core per node, regardless of this machine's cores.
 SlurmdParameters=config_overrides
-# A dead node is detected quickly, and used again as soon as it is back.
+# A failed node is detected quickly, and used again as soon as it has restarted.
 SlurmdTimeout=10
 ReturnToService=2
 SchedulerParameters=sched_interval=1,sched_min_interval=0,batch_sched_delay=0,bf_interval=1
 KillWait=5
-# Few, so that a test can ask for more.
+# A low limit, so that a test can exceed it.
 MaxArraySize=101
 PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE
 EOF

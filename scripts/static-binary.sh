@@ -1,5 +1,5 @@
 #!/bin/sh
-# Builds an `evolver` that depends on no system library, linked statically with musl:
+# Builds an `evolver` without system libraries, linked statically with musl:
 #
 #     scripts/static-binary.sh [x86_64|aarch64]      default: this machine's processor
 #

@@ -2,18 +2,18 @@
 # Runs cargo for a Cortex-M4 or, with --target, another processor, e.g. in firmware-example:
 #
 #     ../scripts/thumb-cargo.sh build --release [--target thumbv7em-none-eabi]
-#     scripts/thumb-cargo.sh --compiler [--target …]       only finds the compiler and prints it
+#     scripts/thumb-cargo.sh --compiler [--target …]       prints the compiler and builds nothing
 #
 # The target's core library (std for targets with an operating system) comes from the first of these
 # sources that works:
 #
-#   1. the Rust toolchain in use has it;
-#   2. rustup adds it (skipped with RUSTUP_TARGET_ADD=0);
-#   3. the system's Rust builds it from source. With PROVIDE_TOOLS=1, Debian's packages for this
-#      are installed.
+#   1. the active Rust toolchain, if it has the library;
+#   2. rustup, which installs it (skipped with RUSTUP_TARGET_ADD=0);
+#   3. the system's Rust, which builds it from source. With PROVIDE_TOOLS=1, the Debian packages
+#      needed for this are installed.
 #
 # Prints the compiler to stderr, because sizes and instruction counts depend on it. If no source
-# works, prints what to install and exits with 69.
+# works, prints what to install and exits with code 69.
 set -eu
 
 target=thumbv7em-none-eabihf
@@ -54,7 +54,7 @@ has_system_rust() {
     [ "$(printf '%s\n' "$version_min" "$version" | sort -V | head -n 1)" = "$version_min" ]
 }
 
-# Runs a program of the system's Rust, without the variables that rustup or an outer cargo has set.
+# Runs a program of the system's Rust, without the variables set by rustup or a calling cargo.
 system() {
     program=$1
     shift

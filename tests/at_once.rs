@@ -1,5 +1,5 @@
-//! Many processes started at once in one directory: none fails, nothing is lost, and they leave the
-//! same files as a single process. `TEST_ALL=1` repeats this thousands of times.
+//! Many processes started simultaneously in one directory: none fails, no result is lost, and they
+//! leave the same files as a single process. `TEST_ALL=1` repeats this thousands of times.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use tests::full;
 use tests::program::Evolver;
 
-/// Six runs that take milliseconds, so that processes meet often.
+/// Six runs of a few milliseconds each, so that processes often run at the same time.
 const SUITE: &str = "
 name = \"own\"
 
@@ -29,10 +29,10 @@ steps = 20
 
 const RUN: &str = "suite own.toml run --out suite --threads 1 --progress none";
 
-/// Longer than any operation here takes.
+/// Maximum duration of any operation here.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// The locks of a file system.
+/// Locking behaviour of a file system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Locks {
     /// Every process sees the locks of all others.
@@ -64,7 +64,7 @@ int gethostname(char *name, size_t size) {
 }
 ";
 
-/// The shared library built from it, once.
+/// Builds the shared library from `OTHER_LOCKS`, once.
 fn other_locks() -> PathBuf {
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -82,7 +82,7 @@ fn other_locks() -> PathBuf {
     folder.path().join("locks.so")
 }
 
-/// Returns how often to repeat something: fewer times unless all cases are requested.
+/// Returns the number of repetitions: fewer unless all cases are requested.
 fn times(reduced: usize, all: usize) -> usize {
     if full::all_cases() { all } else { reduced }
 }
@@ -105,13 +105,13 @@ fn command(evolver: &Evolver, locks: Locks, line: &str) -> Command {
     command
 }
 
-/// Starts all these commands, and waits for all of them.
+/// Starts all these commands, and waits for them to exit.
 fn at_once(evolver: &Evolver, locks: Locks, lines: &[&str]) -> Vec<Output> {
     let start = |line: &&str| command(evolver, locks, line).spawn().expect("it starts");
     let started: Vec<Child> = lines.iter().map(start).collect();
     let ended = started.into_iter().map(Child::wait_with_output);
     ended
-        .map(|output| output.expect("it is our child"))
+        .map(|output| output.expect("a child process"))
         .collect()
 }
 
@@ -121,8 +121,8 @@ fn assert_success(outputs: &[Output], what: &str) {
     }
 }
 
-/// Every file below a folder, hidden ones too, except those with the command and the duration of a
-/// run.
+/// Reads all files below a folder, including hidden ones, except those with the command and the
+/// duration of a run.
 fn contents(evolver: &Evolver, folder: &str) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files
@@ -218,7 +218,7 @@ fn six_evolutions_with_the_same_name_each_get_their_own_directory() {
 #[test]
 fn two_galleries_at_once_both_succeed_and_the_users_folder_is_kept() {
     let evolver = with_the_suite();
-    // A run that takes longer to show than a process takes to start.
+    // A run that takes longer to draw than a process takes to start.
     let long = "evolve --grid 12x12 --robots 40 --population 2 --generations 1 --repetitions 1 \
                 --steps 20000 --threads 1 --out long";
     for made in [RUN, long] {
@@ -248,7 +248,7 @@ fn two_galleries_at_once_both_succeed_and_the_users_folder_is_kept() {
         assert_eq!(evolver.read(".g.part/mother.txt"), b"dear", "{what}");
         let parts = fs::read_dir(evolver.folder()).unwrap().flatten();
         let parts = parts.filter(|entry| entry.file_name().to_string_lossy().ends_with(".part"));
-        assert_eq!(parts.count(), 1, "{what}: only that of the user");
+        assert_eq!(parts.count(), 1, "{what}: only the user's file remains");
     }
 }
 
@@ -269,7 +269,7 @@ fn a_run_held_by_a_stopped_process_is_waited_for_and_its_holder_is_named() {
         ("suite own.toml run --progress json", "KILL"),
     ] {
         let evolver = Evolver::in_empty_folder();
-        // One short run, long enough to be stopped.
+        // A single run, long enough to be stopped.
         let long = SUITE
             .replace("runs = 6", "runs = 1")
             .replace("generations = 2", "generations = 100")
@@ -295,7 +295,7 @@ fn a_run_held_by_a_stopped_process_is_waited_for_and_its_holder_is_named() {
             .by_ref()
             .map(Result::unwrap)
             .find(|line| line.contains("waiting"))
-            .expect("waiting is said before the end");
+            .expect("a message about waiting");
         let host = nix::unistd::gethostname().unwrap();
         let who = format!("process {} on {} ", holder.id(), host.display());
         assert!(
@@ -309,7 +309,7 @@ fn a_run_held_by_a_stopped_process_is_waited_for_and_its_holder_is_named() {
         let again = stderr
             .map(Result::unwrap)
             .filter(|line| line.contains("waiting"));
-        assert_eq!(again.count(), 0, "it is said once");
+        assert_eq!(again.count(), 0, "the message is printed once");
         if way.contains("json") {
             let event = format!("\"process\":{},", holder.id());
             let waiting = stdout

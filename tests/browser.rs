@@ -1,4 +1,4 @@
-//! The pages, opened from files in a headless Chromium without a network.
+//! Opens the pages from files in a headless Chromium without a network.
 
 use minimal_surprise_evolution::finished_run::FinishedRun;
 use minimal_surprise_replay::page::page;
@@ -41,7 +41,8 @@ fn succeed(evolver: &Evolver, line: &str) -> Finished {
     run
 }
 
-/// The exit code is 2 if the input cannot be used, 1 if a run is damaged.
+/// Checks the exit code, 2 if the input is invalid or 1 if a run is damaged, and the words of the
+/// message.
 fn assert_refused(run: &Finished, code: i32, words: &[&str]) {
     assert_eq!(run.code, Some(code), "{run:?}");
     for word in words {
@@ -50,7 +51,7 @@ fn assert_refused(run: &Finished, code: i32, words: &[&str]) {
     assert_eq!(run.stderr.trim_end().lines().count(), 1, "{run:?}");
 }
 
-/// A browser; `None` if there is none and the test may be skipped.
+/// Returns a browser; `None` if Chromium is not installed and the test may be skipped.
 fn browser() -> Option<Browser> {
     require(chromium()).map(|chromium| Browser::start(&chromium))
 }
@@ -65,7 +66,7 @@ fn recording_of(evolver: &Evolver, run: &str) -> Recording {
     Recording::of_run(run, &FinishedRun::read(&path).unwrap(), &|| ()).unwrap()
 }
 
-/// Compares every kind of scene of some states with those of the page.
+/// Compares every kind of scene of some states with the page's scenes.
 fn assert_same_scenes(browser: &mut Browser, recording: &Recording) {
     let steps = recording.steps();
     let states = [0, 1, 2, 127, 128, 129, steps / 2, steps - 1, steps];
@@ -189,11 +190,11 @@ fn a_page_whose_steps_differ_from_the_run_says_so() {
         .text("runs/run/final.json")
         .replace(recorded, &other);
     evolver.write("runs/run/final.json", changed.as_bytes());
-    // The program refuses such a run, but a page may be changed later.
+    // The program rejects such a run, but a page may be changed later.
     assert_refused(
         &run(&evolver, "replay runs/run --html run.html"),
         1,
-        &["runs/run", "another run's"],
+        &["runs/run", "another run"],
     );
     let recording = recording_of(&evolver, "runs/run");
     let text = page(&recording, Colouring::Structure, None).unwrap();
@@ -273,7 +274,7 @@ fn a_click_on_a_robot_shows_what_it_predicts_and_senses() {
     browser.assert_quiet();
 }
 
-/// The controls that Tab reaches, once around, by id, label or text.
+/// Returns the controls reached by Tab in one cycle, by ID, label or text.
 fn tab_order(browser: &mut Browser) -> Vec<String> {
     let here = "(() => { const at = document.activeElement;
         return at === document.body ? '' : at.id || at.textContent; })()";
@@ -296,7 +297,7 @@ fn tab_order(browser: &mut Browser) -> Vec<String> {
     }
 }
 
-/// Presses keys and waits for their effect.
+/// Presses keys and waits until the expression is true.
 fn after(browser: &mut Browser, keys: &[&str], expression: &str) {
     for key in keys {
         browser.press(key);
@@ -360,7 +361,7 @@ fn the_replay_works_with_the_keyboard_alone() {
         &["t"],
         "document.documentElement.dataset.theme === 'dark'",
     );
-    // Keys pressed on a control go to the control.
+    // A focused control receives the keys.
     let _: Value = browser.evaluate("document.getElementById('theme').focus(), null");
     after(
         &mut browser,
@@ -464,7 +465,7 @@ fn the_gallery_sorts_filters_and_opens_replays_with_the_keyboard() {
             "{control}: {reached:?}"
         );
     }
-    // After the last control come the runs; arrow keys move from one to the next.
+    // The runs follow the last control; arrow keys move between runs.
     let _: Value = browser.evaluate("document.getElementById('sort').focus(), null");
     browser.press("Tab");
     browser.press("ArrowRight");
@@ -636,7 +637,7 @@ fn input_that_cannot_be_shown_is_refused_and_nothing_is_overwritten() {
             &format!("replay {name} --html out.html"),
             &[name, word],
         );
-        // For a gallery, a run that cannot be shown is one bad run among several.
+        // For a gallery, a run that cannot be shown is one damaged run among several.
         refused_with(1, &format!("gallery {name} --out new"), &[name, word]);
     }
     // Among other runs, an unfinished run is left out.

@@ -1,11 +1,11 @@
-//! The cost of the controller on a robot, and that no panic is linked into the firmware.
+//! Checks the cost of the controller on a robot, and that no panic is linked into the firmware.
 //!
 //! `cargo test -p tests --test budget -- --show-output` prints the table.
 
 use tests::firmware::{self, flash_bytes, link};
 use tests::tools::{Missing, require};
 
-/// The keys of `budget.toml`, and their names in the README's table.
+/// Keys of `budget.toml`, and their names in the README's table.
 const ROWS: [(&str, &str); 9] = [
     ("step_instructions", "one control step, instructions"),
     (
@@ -36,7 +36,7 @@ const ROWS: [(&str, &str); 9] = [
     ),
 ];
 
-/// A row of the table.
+/// Row of the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Row {
     what: String,
@@ -49,7 +49,7 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The limits in `budget.toml`, in the order of [`ROWS`].
+/// Reads the limits in `budget.toml`, in the order of [`ROWS`].
 fn budget() -> Vec<u32> {
     let text = text("budget.toml");
     let lines: Vec<(&str, &str)> = text
@@ -65,7 +65,7 @@ fn budget() -> Vec<u32> {
     ROWS.iter().map(|(key, _)| most(*key)).collect()
 }
 
-/// The README's table of costs, and the compiler that it names.
+/// Reads the README's table of costs, and the compiler that it names.
 fn readme() -> (Vec<Row>, String) {
     let text = text("../README.md");
     let (_, cost) = text.split_once("### Cost").expect("a section on costs");
@@ -85,7 +85,7 @@ fn readme() -> (Vec<Row>, String) {
     (rows, format!("rustc {} ", &compiler[..end.unwrap_or(0)]))
 }
 
-/// The compiler, and the values measured, in the order of [`ROWS`].
+/// Measures the values, in the order of [`ROWS`]; returns the compiler and the values.
 fn measure() -> Result<(String, Vec<u32>), Missing> {
     let firmware = firmware::build()?;
     let lines = firmware.run("budget")?;
@@ -165,7 +165,8 @@ fn no_panic_is_linked_into_a_robot() {
         return;
     };
     assert!(robot.success, "{}", robot.messages);
-    // With an unchecked index it must fail, otherwise the check above proves nothing.
+    // A program with an unchecked index must fail to link; otherwise, the check above proves
+    // nothing.
     let Some(panics) = require(link("probe", "panics")) else {
         return;
     };

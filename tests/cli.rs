@@ -8,7 +8,7 @@ use std::fs;
 use std::time::{Duration, Instant};
 use tests::program::{Evolver, Finished};
 
-/// Flags of a short evolution.
+/// Flags for a short evolution.
 const SHORT: [(&str, &str); 6] = [
     ("--robots", "12"),
     ("--grid", "7x6"),
@@ -18,10 +18,10 @@ const SHORT: [(&str, &str); 6] = [
     ("--generations", "3"),
 ];
 
-/// Longest wait for a process.
+/// Maximum wait for a process.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Waits until a condition holds that another process brings about.
+/// Waits until another process makes a condition true.
 fn wait_until(what: &str, holds: impl Fn() -> bool) {
     let started = Instant::now();
     while !holds() {
@@ -30,7 +30,7 @@ fn wait_until(what: &str, holds: impl Fn() -> bool) {
     }
 }
 
-/// Progress in JSON.
+/// Parses progress events printed as JSON.
 fn events(run: &Finished) -> Vec<serde_json::Value> {
     let lines = run.stdout.lines();
     lines
@@ -38,7 +38,7 @@ fn events(run: &Finished) -> Vec<serde_json::Value> {
         .collect()
 }
 
-/// A short evolution with more flags, which override those with the same name.
+/// Returns the arguments of a short evolution; `flags` override those of [`SHORT`].
 fn short(flags: &[&str]) -> Vec<String> {
     let defaults = SHORT.iter().filter(|(flag, _)| !flags.contains(flag));
     let defaults = defaults.flat_map(|&(flag, value)| [flag, value]);
@@ -50,7 +50,7 @@ fn short(flags: &[&str]) -> Vec<String> {
         .collect()
 }
 
-/// Asserts one message with all these words, exit code 2, and that nothing is written.
+/// Asserts a single message with all these words, exit code 2, and that no file is written.
 fn assert_refused(evolver: &Evolver, arguments: &[String], words: &[&str]) {
     let before = evolver.files();
     let run = evolver.run(arguments);
@@ -421,7 +421,7 @@ fn only_an_unchanged_run_is_resumed() {
         config.replace("steps = 20", "steps = 21").as_bytes(),
     );
     let cut = evolver.run(&resume("cut"));
-    cut.assert_failed(&["config.toml is not what the run was started with"]);
+    cut.assert_failed(&["config.toml differs from the settings that the run was started with"]);
     evolver.write("cut/config.toml", config.as_bytes());
     let mut checkpoint = evolver.read("cut/checkpoint");
     checkpoint[100] ^= 4;
@@ -466,7 +466,7 @@ fn the_first_signal_ends_cleanly_and_says_how_to_resume() {
     }
 }
 
-/// A generation that takes longer than a test waits.
+/// Flags of an evolution whose generations take longer than a test waits.
 const ENDLESS: &str = "--grid 20x20 --robots 100 --population 50 --repetitions 10 \
                        --steps 3000000 --threads 1 --seed 1 --out endless";
 
@@ -510,7 +510,7 @@ fn a_signal_that_the_caller_ignores_stays_ignored() {
         let line = format!("trap '' {signal}; {program} {work} {signal} & echo $! > pid; wait $!");
         done(signal, line, signal);
     }
-    // Shells ignore SIGINT for background jobs.
+    // Shells make background jobs ignore SIGINT.
     let job = format!("{program} {work} job & echo $! > pid; wait $!");
     done("job", job, "INT");
     let nohup = format!("nohup {program} {work} nohup > out 2>&1 & echo $! > pid; wait $!");
@@ -543,7 +543,7 @@ fn a_run_whose_output_is_closed_stops_unfinished_and_says_how_to_resume() {
     unfinished(&line, "head -1", "evolve --resume cut");
     let resumed = evolver.run(&["evolve", "--resume", "cut"]);
     assert_eq!(hash_of(&resumed), hash_of(&whole));
-    // The drawing is shown before the work begins.
+    // The drawing is shown before the work begins, so the reader can close the pipe.
     unfinished(
         &format!("{work} --out drawn"),
         "sleep 0",
@@ -560,7 +560,7 @@ fn a_run_whose_output_is_closed_stops_unfinished_and_says_how_to_resume() {
     assert!(finished.stdout.contains("6 of 6 runs done"), "{finished:?}");
 }
 
-/// Commands that print, in a folder with a run.
+/// Commands that print to standard output, in a folder with a run.
 const PRINTING: [&str; 15] = [
     "--help",
     "--version",
@@ -604,7 +604,7 @@ fn a_full_disk_behind_standard_output_is_a_failure_and_no_panic() {
     let said = String::from_utf8_lossy(&piped.stderr);
     assert_eq!(piped.status.code(), Some(1), "{said}");
     assert!(said.contains("evolve --resume other-2"), "{said}");
-    // A full standard error does not panic either.
+    // A full standard error does not cause a panic either.
     let lines = short(&["--seed", "1", "--progress", "lines", "--out"]).join(" ");
     for (index, place) in ["/dev/full", "&-"].into_iter().enumerate() {
         for (command, code) in [
@@ -633,7 +633,7 @@ fn exit_codes_distinguish_bad_input_failures_and_interruptions() {
     let cases = [
         ("--version", 0),
         ("classify run", 0),
-        // A failure: of a run or of the disk.
+        // A failure of a run or of the disk.
         ("classify cut", 1),
         ("inspect cut", 1),
         ("replay cut --svg a.svg", 1),
@@ -643,7 +643,7 @@ fn exit_codes_distinguish_bad_input_failures_and_interruptions() {
         ("evolve --resume cut", 1),
         ("inspect /proc/self/mem", 1),
         ("replay run --svg /dev/full --overwrite", 1),
-        // The input cannot be used.
+        // Invalid input.
         ("nosuch", 2),
         ("classify --nosuch", 2),
         ("classify nothing", 2),
@@ -775,7 +775,7 @@ fn a_directory_is_a_run_as_soon_as_it_has_its_name() {
             resumed += 1;
         }
     }
-    println!("{resumed} of {tried} killed at their beginning had begun and went on");
+    println!("{resumed} of {tried} runs killed at the start had begun and were resumed");
     assert!(resumed > 0);
 }
 

@@ -1,4 +1,4 @@
-//! The commands that analyse evolved genomes, run as a user would run them.
+//! Tests the commands that analyse evolved genomes, run as a user would run them.
 
 use embedded_storage::nor_flash::NorFlash;
 use firmware_example::memory_flash::MemoryFlash;
@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tests::program::{Evolver, Finished};
 
-/// A line of four, a pair, and two robots that are only in dispersion.
+/// A line of four, a pair, and two robots that form no structure except dispersion.
 const DRAWING: &str = "
     ▲········
     ·········
@@ -33,7 +33,7 @@ fn fixture_text(name: &str) -> String {
     fs::read_to_string(fixture(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-/// A folder with a short run in `run`.
+/// Creates a folder with a short run in `run`.
 fn with_a_run(flags: &[&str]) -> Evolver {
     let evolver = Evolver::in_empty_folder();
     let short =
@@ -378,7 +378,7 @@ fn invalid_genome_text_is_refused_with_its_line() {
         let flags = ["import", "--action", "action", "--prediction", &prediction];
         assert_refused(&evolver.run(&flags), &words);
     }
-    assert_eq!(evolver.files(), ["action"], "nothing else was written");
+    assert_eq!(evolver.files(), ["action"], "no other file was written");
 }
 
 #[test]
@@ -470,7 +470,7 @@ fn a_drawing_from_the_terminal_is_classified_like_its_run() {
     );
 }
 
-/// Compiles and runs a program that prints the bytes of an exported genome.
+/// Compiles and runs a program that prints the bytes of an exported genome, and returns the bytes.
 fn printed_by(evolver: &Evolver, compiler: &str, arguments: &[&str]) -> Vec<u8> {
     let run = |program: &Path, arguments: &[&str]| {
         let mut command = std::process::Command::new(program);

@@ -1,4 +1,4 @@
-//! One seed gives one result, independent of threads, builds and interruptions.
+//! One seed gives one result, whatever the threads, builds and interruptions.
 
 use minimal_surprise_sim::EnginePath;
 use minimal_surprise_sim::engine::PATH_VARIABLE;
@@ -26,11 +26,11 @@ const EVOLUTION: [&str; 15] = [
     "31",
 ];
 
-/// Its hash on every machine.
+/// Hash of [`EVOLUTION`] on every machine.
 const EVOLUTION_HASH: &str = "5af79e9f6d39fb2448edb30f7dd788f90428940f44d6386844b6a4908b381b37";
 
-/// Two evolutions whose hashes are pinned: fixed seeds give the same results in every version,
-/// unless the change log says otherwise.
+/// Two evolutions with pinned hashes: fixed seeds give the same results in every version, unless
+/// the change log states otherwise.
 const PINNED: [(&[&str], &str); 2] = [
     (
         &[
@@ -73,7 +73,7 @@ fn hash(evolver: &Evolver, arguments: &[&str], extra: &[&str]) -> String {
     evolver.text("run/DONE").trim().to_owned()
 }
 
-/// Every file of the run except those with its command and duration.
+/// Reads all files of the run except those with the command and duration.
 fn contents(evolver: &Evolver) -> Vec<(String, String)> {
     let files = evolver.files().into_iter();
     files
@@ -119,7 +119,7 @@ fn a_build_with_debug_assertions_gives_the_same_hash() {
 #[test]
 fn at_least_twenty_kills_and_resumes_change_nothing() {
     let seed = 20;
-    println!("seed of the moments: {seed}");
+    println!("seed of the kill times: {seed}");
     let mut moments = ChaCha8Rng::seed_from_u64(seed);
     let evolver = Evolver::in_empty_folder();
     let flags = ["--out", "run", "--progress", "lines"];
@@ -132,7 +132,7 @@ fn at_least_twenty_kills_and_resumes_change_nothing() {
             break;
         }
         kills += 1;
-        assert!(kills < 1000, "it does not get anywhere");
+        assert!(kills < 1000, "the run makes no progress");
         running = evolver.start(&["evolve", "--resume", "run", "--progress", "lines"]);
     }
     println!("{kills} kills");
@@ -152,7 +152,7 @@ fn at_least_twenty_kills_and_resumes_change_nothing() {
     assert_eq!(
         evolver.files(),
         uninterrupted.files(),
-        "nothing else is left behind"
+        "no other files are left"
     );
 }
 

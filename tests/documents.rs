@@ -1,10 +1,10 @@
-//! Documents that are made from the code say what the code says.
+//! Documents generated from the code match the code.
 
 use minimal_surprise_evolution::settings::SETTINGS;
 use std::fs;
 use std::path::Path;
 
-/// The table of settings in `docs/settings.md`.
+/// Returns the table of settings for `docs/settings.md`.
 fn table() -> String {
     let mut table =
         "| setting | meaning | default | valid | in a suite |\n|---|---|---|---|---|\n".to_owned();

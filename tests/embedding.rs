@@ -1,4 +1,4 @@
-//! Builds the README's code for embedding the controller, unchanged.
+//! Builds the README's code for embedding the controller without changes.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -6,7 +6,7 @@ use std::path::Path;
 use tests::firmware::{build_in, target_dir};
 use tests::tools::require;
 
-/// The files in the README: fenced blocks whose first line is a comment with a file name.
+/// Returns the files in the README: fenced blocks whose first line is a comment with a file name.
 fn files(readme: &str) -> Vec<(&str, &str)> {
     let blocks = readme.split("\n```").skip(1).step_by(2);
     let named = blocks.filter_map(|block| {
@@ -39,7 +39,7 @@ fn the_readmes_embedding_code_builds_outside_the_repository() {
     }
     let genome = repository.join("controller/tests/b-predefined-line.genome");
     fs::copy(genome, robot.join("best.genome")).unwrap();
-    // The versions that the robot's firmware is tested with.
+    // The same versions as in the tests of the robot's firmware.
     let versions = repository.join("firmware-example/Cargo.lock");
     fs::copy(versions, robot.join("Cargo.lock")).unwrap();
 

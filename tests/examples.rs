@@ -3,7 +3,7 @@
 use escargot::CargoBuild;
 use std::path::Path;
 
-/// The lines that an example prints.
+/// Runs an example and returns the lines that it prints.
 fn lines_of(example: &str) -> Vec<String> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../Cargo.toml");
     let built = CargoBuild::new()
@@ -18,7 +18,7 @@ fn lines_of(example: &str) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// The number after `prefix` in a line.
+/// Returns the number after `prefix` in a line.
 fn number(line: &str, prefix: &str) -> f64 {
     let rest = line.split_once(prefix).map_or("", |(_, rest)| rest);
     let digits = rest.split(' ').next().unwrap_or_default();

@@ -1,5 +1,5 @@
-//! The text files of the program published by the paper's authors, in `fixtures/exchange`: read,
-//! rerun and written.
+//! Text files of the program published by the paper's authors, in `fixtures/exchange`: read, rerun
+//! and written.
 
 use minimal_surprise_controller::{Controller, Prediction, SensorModel, Template, Topology};
 use minimal_surprise_sim::exchange::{
@@ -39,7 +39,7 @@ impl Sample {
         std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
     }
 
-    /// The best genome of each generation.
+    /// Reads the best genome of each generation.
     fn genomes(&self) -> Vec<ImportedGenome> {
         let action = read_genomes(&self.text("action_genomes")).unwrap();
         let prediction = read_genomes(&self.text("prediction_genomes")).unwrap();

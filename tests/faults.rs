@@ -1,10 +1,10 @@
-//! The wheels stop first in every fault. QEMU reports what is written to the wheels' registers.
+//! Every fault stops the wheels first. QEMU traces the writes to the wheels' registers.
 
 use std::fs;
 use tests::firmware::{self, Faulted, fault_on_mps2, fault_on_stm32f4};
 use tests::tools::require;
 
-/// A provoked fault, the emulated robot's log of it, and QEMU's report of it on the STM32F405.
+/// A fault, the emulated robot's log of it, and QEMU's report of it on the STM32F405.
 const FAULTS: [(&str, &str, &str); 8] = [
     ("panic", "on purpose", ""),
     (
@@ -45,7 +45,7 @@ fn the_emulated_robot_stops_its_wheels_first_in_every_fault() {
         };
         let Faulted { wheels, log } = faulted;
         assert!(log.contains(says), "{fault}: {log}");
-        // Both lights, then none.
+        // First both lights, then none.
         let [on, off] = &wheels[..] else {
             panic!("{fault}: {wheels:?}");
         };
@@ -68,8 +68,8 @@ fn the_stm32f4_stops_its_wheels_first_in_every_fault() {
             return;
         };
         let Faulted { wheels, log } = faulted;
-        // PC6 to PC9 are set high, then low, then become outputs of the program instead of the
-        // timer.
+        // PC6 to PC9 are set high, then low, then become outputs controlled by the program instead
+        // of the timer.
         for (written, place) in wheels.iter().zip([
             "offset 0x018, value 0x000003c0)",
             "offset 0x018, value 0x03c00000)",
@@ -82,7 +82,8 @@ fn the_stm32f4_stops_its_wheels_first_in_every_fault() {
     }
 }
 
-/// The stack is at the bottom of RAM, and [`firmware_example::faults`] forbids access below it.
+/// The stack is at the bottom of RAM, and [`firmware_example::faults`] makes accesses below it
+/// fail.
 #[test]
 fn the_stack_of_both_boards_is_at_the_start_of_ram() {
     for name in ["memory.x", "stm32f4/memory.x"] {

@@ -1,4 +1,4 @@
-//! Files that commands write: on a full disk, with long names, and over special files.
+//! Files written by commands: on a full disk, with long names, and to special files.
 
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
@@ -11,7 +11,7 @@ use tests::disk::Disk;
 use tests::program::Evolver;
 use tests::tools;
 
-/// Longer than any operation here takes.
+/// Maximum duration of any operation here.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 const EVOLVE: [&str; 11] = [
@@ -28,7 +28,7 @@ const EVOLVE: [&str; 11] = [
     "7",
 ];
 
-/// A folder with a run in `r`.
+/// Creates a folder with a run in `r`.
 fn with_a_run() -> Evolver {
     let evolver = Evolver::in_empty_folder();
     evolve(&evolver, "r");
@@ -48,7 +48,7 @@ fn on_a_full_disk_nothing_is_left_behind_and_the_second_attempt_succeeds() {
     };
     let trajectory = "export r --format trajectory --out disk/file";
     let writers = [
-        // Its size is known in advance.
+        // The size of a trajectory is known in advance.
         (trajectory, 2, "of disk would be needed"),
         (
             "gallery r --threads 1 --out disk/gallery",
@@ -75,7 +75,7 @@ fn on_a_full_disk_nothing_is_left_behind_and_the_second_attempt_succeeds() {
 #[test]
 fn a_run_that_does_not_fit_on_the_disk_leaves_nothing() {
     let evolver = with_a_run();
-    // Enough bytes to start the run, but too few inodes for its files.
+    // Enough space to start the run, but too few inodes for its files.
     let Some(disk) = tools::require(Disk::mounted_at(
         evolver.folder().join("disk"),
         "64m,nr_inodes=5",
@@ -194,7 +194,7 @@ fn overwriting_a_link_a_pipe_or_a_device_does_not_replace_it() {
         let reader = scope.spawn(|| fs::read(at("pipe")));
         (
             svg(&evolver, "pipe"),
-            reader.join().expect("it does not panic"),
+            reader.join().expect("the reader does not panic"),
         )
     });
     assert_eq!(written.code, Some(0), "{written:?}");

@@ -1,4 +1,4 @@
-//! A simulated swarm in which robot 0 is the firmware on an emulated robot.
+//! A simulated swarm in which robot 0 is replaced by the firmware on an emulated robot.
 
 use minimal_surprise_controller::{Prediction, SensorModel, Topology};
 use std::path::Path;
@@ -7,7 +7,7 @@ use tests::program::{Evolver, Finished};
 use tests::robot::QemuRobot;
 use tests::tools::require;
 
-/// The value in the line of the output that starts with `name`.
+/// Returns the value in the output line that starts with `name`.
 fn word<'r>(run: &'r Finished, name: &str) -> &'r str {
     assert_eq!(run.code, Some(0), "{run:?}");
     let line = run.stdout.lines().find_map(|line| line.strip_prefix(name));
@@ -32,7 +32,7 @@ fn a_swarm_with_the_emulated_robot_ends_with_the_hash_of_the_simulation() {
         let flashed = evolver.run(&["flash", &name, "--port", port]);
         assert_eq!(flashed.code, Some(0), "{flashed:?}");
         assert!(flashed.stdout.contains("running"), "{flashed:?}");
-        // Noise causes readings that the swarm alone would not.
+        // Noise causes readings that would not occur in the swarm alone.
         let flags = ["--steps", "500", "--seed", "3", "--noise", "0.05"];
         let hil = |mode: &[&str]| {
             let arguments = [&["hil", name.as_str()], mode, &flags].concat();
@@ -73,7 +73,7 @@ fn a_run_directory_provides_the_settings_to_run() {
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
-    // `hil` has left it running, as before.
+    // `hil` has left the robot running, as before.
     let steps = |second: &serde_json::Value| {
         let counts = ["straight", "turned_left", "turned_right"];
         counts

@@ -1,4 +1,4 @@
-//! Imports point one way: no two files of a crate import each other, directly or through others.
+//! No two files of a crate import each other, neither directly nor through other files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -25,7 +25,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The module that a file is.
+/// Returns the module path of a file.
 fn module(source: &Path, root: &Path) -> Vec<String> {
     let relative = source.strip_prefix(root).unwrap().with_extension("");
     let mut module: Vec<String> = relative
@@ -38,7 +38,7 @@ fn module(source: &Path, root: &Path) -> Vec<String> {
     module
 }
 
-/// The text without comments and unit tests.
+/// Reads a file without comments and unit tests.
 fn code(source: &Path) -> String {
     let text = fs::read_to_string(source).unwrap();
     let text = text.split("#[cfg(test)]\nmod ").next().unwrap();
@@ -46,7 +46,7 @@ fn code(source: &Path) -> String {
     lines.collect::<Vec<_>>().join(" ")
 }
 
-/// The paths of a `use` tree, such as `crate::a::{b, c::d}`.
+/// Collects the paths of a `use` tree, such as `crate::a::{b, c::d}`.
 fn paths(tree: &str, prefix: &str, found: &mut Vec<String>) {
     let mut depth = 0;
     let mut start = 0;
@@ -72,7 +72,7 @@ fn paths(tree: &str, prefix: &str, found: &mut Vec<String>) {
     }
 }
 
-/// The modules that a module imports.
+/// Returns the modules imported by a module.
 fn imports(of: &[String], code: &str, modules: &BTreeSet<Vec<String>>) -> BTreeSet<Vec<String>> {
     let mut found = Vec::new();
     for part in code.split("use ").skip(1) {
@@ -99,7 +99,7 @@ fn imports(of: &[String], code: &str, modules: &BTreeSet<Vec<String>>) -> BTreeS
                 base.pop();
             }
         }
-        // A path that names a child of this module needs no `self`.
+        // A path that starts with a child of this module needs no `self`.
         let mut full = base;
         full.extend(parts.iter().map(|&part| part.to_owned()));
         if !is_local && !modules.contains(&full[..=of.len()]) {
@@ -113,7 +113,7 @@ fn imports(of: &[String], code: &str, modules: &BTreeSet<Vec<String>>) -> BTreeS
     found.iter().filter_map(resolve).collect()
 }
 
-/// A cycle that begins at a module, if there is one.
+/// Returns a cycle that begins at a module, if one exists.
 fn cycle<'a>(
     from: &'a Vec<String>,
     edges: &'a BTreeMap<Vec<String>, BTreeSet<Vec<String>>>,
@@ -151,7 +151,7 @@ fn no_two_files_import_each_other() {
             .iter()
             .map(|file| {
                 let module = module(file, &root);
-                // A module that only names its children does not use them.
+                // A re-export alone does not count as an import.
                 let code = code(file).replace("pub use ", "pub ");
                 let imports = imports(&module, &code, &modules);
                 (module, imports)

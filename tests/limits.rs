@@ -1,4 +1,4 @@
-//! Work that exceeds the machine's memory or disk is refused before anything is written, and
+//! Work that exceeds the machine's memory or disk is rejected before anything is written, and
 //! estimates are close to measurements.
 #![cfg(unix)]
 
@@ -25,7 +25,7 @@ use tests::program::{Evolver, Finished};
 use tests::{genome, tools};
 use wait4::Wait4;
 
-/// A tiny evolution in which one setting at a time is made large.
+/// A tiny evolution whose settings are made large one at a time.
 const TINY: [(&str, &str); 6] = [
     ("grid", "5x5"),
     ("robots", "2"),
@@ -34,14 +34,14 @@ const TINY: [(&str, &str); 6] = [
     ("repetitions", "1"),
     ("steps", "1"),
 ];
-/// Threads of the program; each uses some memory.
+/// Number of threads of the program; each uses some memory.
 const THREADS: u32 = 2;
-/// Longer than any operation here takes.
+/// Maximum duration of any operation here.
 const PATIENCE: Duration = Duration::from_secs(120);
 /// Memory used by the program itself, in bytes.
 const PROGRAM: f64 = 16e6;
 
-/// The command that runs it.
+/// Returns the arguments of the tiny evolution with these settings.
 fn evolve(settings: &[(&'static str, &str)]) -> Vec<String> {
     let tiny = TINY
         .iter()
@@ -60,12 +60,13 @@ fn settings(of: &[(&'static str, &str)]) -> Settings {
     Settings::resolve(&given, || 1).unwrap()
 }
 
-/// Runs the program to its end; returns its peak memory use in bytes.
+/// Runs the program to completion; returns its peak memory use in bytes.
 fn peak(evolver: &Evolver, arguments: &[String]) -> f64 {
     let child = Command::new(evolver.program())
         .args(arguments)
         .current_dir(evolver.folder())
-        // This path computes only the actions that are used, so it is fast with many genomes.
+        // This engine path computes only the actions that are used, so it is fast with many
+        // genomes.
         .env("MINIMAL_SURPRISE_PATH", "portable")
         .stdin(Stdio::null())
         .stdout(Stdio::null())
@@ -179,7 +180,7 @@ fn a_run_that_does_not_fit_into_memory_is_not_damaged_and_is_resumed_when_it_fit
         assert!(started.elapsed() < PATIENCE, "no checkpoint yet");
         thread::sleep(Duration::from_millis(1));
     }
-    assert!(!begun.kill(), "it was not done yet");
+    assert!(!begun.kill(), "the run had ended before the kill");
     let files = evolver.files();
     let status = "suite one.toml status --out suite";
     let status = within(&evolver, SHORT, &words(status));
@@ -203,7 +204,8 @@ fn a_run_that_does_not_fit_into_memory_is_not_damaged_and_is_resumed_when_it_fit
             .eq(files.iter().filter(|file| !is_lock(file)))
     );
 
-    // Once the large run is done, the rest needs little memory; so does a shard without it.
+    // Once the large run is done, the other run needs little memory; so does a shard without the
+    // large run.
     evolver.write("both.toml", format!("{ONE_LARGE}{ONE_SMALL}").as_bytes());
     let small = "run-task --suite both.toml --shard 1/2 --out suite --threads 1";
     let small = within(&evolver, SHORT, &words(small));
@@ -352,7 +354,7 @@ fn the_files_of_a_run_have_nearly_the_estimated_sizes() {
     }
 }
 
-/// A suite with the given number of runs.
+/// Writes a suite with the given number of runs.
 fn suite(evolver: &Evolver, runs: u32, robots: u32) {
     let robots: Vec<String> = (1..=robots).map(|n| n.to_string()).collect();
     let text = format!(
@@ -365,7 +367,7 @@ fn suite(evolver: &Evolver, runs: u32, robots: u32) {
 
 /// Limit on the address space in kilobytes, too small for the suite's large run.
 const SHORT: u32 = 300_000;
-/// A suite of one run for which that is too little, although little is computed.
+/// A suite with a single run that exceeds [`SHORT`], although it computes little.
 const ONE_LARGE: &str = "
     name = \"own\"
     [[experiment]]
@@ -378,7 +380,7 @@ const ONE_LARGE: &str = "
     repetitions = 1
     steps = 1
 ";
-/// Another experiment.
+/// A small experiment, which fits.
 const ONE_SMALL: &str = "
     [[experiment]]
     name = \"small\"
@@ -461,7 +463,7 @@ fn work_that_exceeds_this_machine_is_refused_before_anything_is_written() {
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(refused.stderr.contains("steps = 1000000"), "{refused:?}");
     assert_eq!(evolver.files(), files, "{refused:?}");
-    // Even the bits of one run exceed the counter; a replay has no population.
+    // The scored bits of a single run overflow the counter; a replay has no population.
     let endless =
         "replay run/best.genome --grid 16384x16384 --robots 268435456 --steps 4294967295 --svg a";
     let refused = evolver.run(&words(endless));
@@ -628,7 +630,7 @@ fn a_robot_whose_write_count_is_exhausted_says_so_and_no_export_creates_one() {
     let mut robot = LinkRobot::start(Flash::with_slot(&slot(&container, u32::MAX)));
     assert_eq!(robot.slots.write_count(), u32::MAX);
     assert_eq!(robot.begin(100, 0), Err(Refusal::CountExhausted));
-    // The remedy: with both slots erased, the robot counts from 1 again.
+    // The remedy: after both slots are erased, the robot counts from 1 again.
     let mut flash = robot.stop();
     let end = Flash::OFFSET + 2 * Slots::<Flash>::SLOT_BYTES as u32;
     flash.erase(Flash::OFFSET, end).unwrap();

@@ -1,4 +1,4 @@
-//! Names, paths and files from users, through the whole program.
+//! Names, paths and files from users, passed through the whole program.
 
 use minimal_surprise_evolution::text;
 use pulldown_cmark::{Event, Options, Parser, Tag};
@@ -13,7 +13,7 @@ use tests::program::{Evolver, Finished};
 const SMALL: &str = "grid = \"8x8\"\nrobots = 20\npopulation = 4\ngenerations = 3\nrepetitions = 1\n\
                      steps = 20\nseed = 7\n";
 
-/// An experiment with one short run.
+/// Returns an experiment with one short run.
 fn experiment(name: &str) -> String {
     let name = serde_json::to_string(name).unwrap();
     format!(
@@ -40,7 +40,7 @@ fn assert_refused(run: &Finished, words: &[&str]) {
     }
 }
 
-/// Runs a line printed by the program in a shell.
+/// Runs a shell command printed by the program.
 fn in_a_shell(evolver: &Evolver, line: &str) -> Output {
     let mut path = OsString::from(evolver.program().parent().unwrap());
     path.push(":");
@@ -281,7 +281,7 @@ fn two_exported_genomes_fit_into_one_firmware() {
     assert_refused(&raw, &["--name", "--format c"]);
 }
 
-/// A text as a Windows program may save it.
+/// Returns a text as saved by a Windows program.
 fn of_windows(text: &str) -> Vec<u8> {
     format!("\u{feff}{}", text.replace('\n', "\r\n")).into_bytes()
 }
@@ -478,7 +478,7 @@ fn paths_that_are_not_utf_8_are_kept() {
         fs::canonicalize(folder).unwrap().join(bytes(b"r\xff"))
     );
 
-    // Its ancestor is in its settings, so that the same run can be repeated.
+    // The settings contain the path of the ancestor, so that the same run can be repeated.
     let from = bytes(b"r\xff/best.genome");
     with("evolve small.toml --out s --from", from);
     done(evolver.run(&["evolve", "s/config.toml", "--out", "t"]));

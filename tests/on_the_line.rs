@@ -1,5 +1,5 @@
-//! Commands for a robot on a serial port, tested with a robot and with other devices that may be on
-//! a port.
+//! Commands for a robot on a serial port, tested with a robot and with other devices that may be
+//! connected to a port.
 #![cfg(target_os = "linux")]
 
 use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Surprise, Topology};
@@ -21,10 +21,10 @@ use tests::link_robot::Flash;
 use tests::program::{Evolver, Finished};
 use tests::pty::{Answer, Device, Fault, PluggedRobot};
 
-/// Longest wait for a command's end.
+/// Maximum wait for a command to exit.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// A folder with two genomes for this kernel and one for a different kernel.
+/// Creates a folder with two genomes for this kernel and one for a different kernel.
 fn with_genomes() -> Evolver {
     let evolver = Evolver::in_empty_folder();
     let topology = Topology::default();
@@ -35,7 +35,7 @@ fn with_genomes() -> Evolver {
     evolver
 }
 
-/// A robot that runs the old genome.
+/// Returns a robot that runs the old genome.
 fn with_the_old_genome(evolver: &Evolver, fault: Fault) -> PluggedRobot {
     let fresh = PluggedRobot::start(Flash::new(), Fault::None);
     let flashed = flash(evolver, "old.genome", &fresh.device.port);
@@ -47,7 +47,7 @@ fn flash(evolver: &Evolver, genome: &str, port: &str) -> Finished {
     evolver.run(&["flash", genome, "--port", port])
 }
 
-/// The CRC of the genome that the robot reports as in use.
+/// Returns the CRC of the genome that the robot reports as in use.
 fn crc_in_use(robot: &PluggedRobot) -> String {
     format!("{:?}", robot.robot().identify().genome)
 }
@@ -57,12 +57,12 @@ fn crc_of(container: &[u8]) -> String {
     format!("crc: {}", u32::from_le_bytes(*crc))
 }
 
-/// Asserts one message with all these words, and the exit code for bad input.
+/// Asserts a single message with all these words, and the exit code for bad input.
 fn assert_refused(run: &Finished, words: &[&str]) {
     assert_error(run, 2, words);
 }
 
-/// Asserts one message with all these words, and the exit code for failures.
+/// Asserts a single message with all these words, and the exit code for failures.
 fn assert_failed(run: &Finished, words: &[&str]) {
     assert_error(run, 1, words);
 }
@@ -84,7 +84,7 @@ fn assert_error(run: &Finished, code: i32, words: &[&str]) {
     assert_eq!(run.stdout, "", "{run:?}");
 }
 
-/// Every command that talks to a robot, on this port.
+/// Returns every command that communicates with a robot, on this port.
 fn all_commands(port: &str) -> [Vec<&str>; 5] {
     [
         vec!["flash", "new.genome", "--port", port],
@@ -512,7 +512,7 @@ fn a_line_unplugged_halfway_leaves_the_old_genome_in_use() {
             (Fault::PulledAfter(done), "the line failed"),
             (Fault::MuteAfter(done), "stopped answering"),
         ] {
-            // The longest time-out is that of an erase.
+            // An erase has the longest time-out, so this case is tested only on request.
             if fault == Fault::MuteAfter(2) && !full::all_cases() {
                 continue;
             }
@@ -568,16 +568,16 @@ fn a_commit_whose_answer_is_lost_is_detected() {
     assert!(crc_in_use(&robot).contains(&new));
 }
 
-/// The command that starts a robot on this port.
+/// Returns the line that shows how to start a robot on this port.
 fn start_line(port: &str) -> String {
     format!("the robot may be stopped now; start it with: evolver start --port {port}")
 }
 
-/// Waits until the robot has carried out this many requests.
+/// Waits until the robot has executed this many requests.
 fn wait_for(robot: &PluggedRobot, done: u64) {
     let started = Instant::now();
     while robot.robot().done < done {
-        assert!(started.elapsed() < PATIENCE, "it does not do that");
+        assert!(started.elapsed() < PATIENCE, "the robot hangs");
         thread::sleep(Duration::from_millis(5));
     }
 }
@@ -607,7 +607,7 @@ fn every_command_ends_although_another_program_reads_the_port() {
     let one = |kind: usize, bytes: usize| {
         let robot = with_the_old_genome(&evolver, Fault::None);
         let port = robot.device.port.clone();
-        // Takes all bytes, or a few now and then.
+        // Reads all bytes at once, or a few at a time.
         let read = match bytes {
             0 => "exec cat <$0".to_owned(),
             bytes => format!("while dd bs={bytes} count=1 <$0 2>&1; do :; done"),
@@ -624,7 +624,7 @@ fn every_command_ends_although_another_program_reads_the_port() {
         };
         let running = evolver.start(&arguments);
         if !full::all_cases() {
-            // Otherwise the request to begin is repeated for 50 s.
+            // With the other reader still running, the request to begin would be repeated for 50 s.
             thread::sleep(Duration::from_secs(4));
             other.kill().unwrap();
         }
@@ -696,7 +696,7 @@ fn wait_applies_only_to_the_first_answer() {
     thread::scope(|scope| {
         for wait in ["1", "60"] {
             scope.spawn(move || {
-                // The first chunk is not answered.
+                // The first chunk gets no reply.
                 let robot = with_the_old_genome(evolver, Fault::MuteAfter(3));
                 let port = robot.device.port.as_str();
                 let started = Instant::now();
@@ -766,14 +766,14 @@ fn ctrl_c_during_hil_restores_the_robot() {
 #[test]
 fn a_second_ctrl_c_ends_at_once_and_says_how_to_start_the_robot() {
     let evolver = with_genomes();
-    // The request to begin is sent, and its answer awaited.
+    // The request to begin has been sent, and the program waits for the reply.
     let robot = with_the_old_genome(&evolver, Fault::MuteAfter(3));
     robot.robot().start().unwrap();
     let port = robot.device.port.as_str();
     let flashing = evolver.start(&["flash", "new.genome", "--port", port]);
     wait_for(&robot, 3);
     flashing.signal("INT");
-    // The robot, an empty line, and the effect of the first Ctrl-C.
+    // The robot's identity, an empty line, and the message about the first Ctrl-C.
     flashing.wait_for_lines(3);
     let run = flashing.interrupt(PATIENCE);
     assert_eq!(run.code, Some(130), "{run:?}");

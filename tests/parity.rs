@@ -22,7 +22,7 @@ fn expected_lines() -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// The built firmware and the log of one of its programs.
+/// Builds the firmware and returns it with the log of one of its programs.
 fn logged(program: &str) -> Option<(Firmware, Vec<String>)> {
     let both = firmware::build().and_then(|firmware| {
         let lines = firmware.run(program)?;
@@ -31,7 +31,7 @@ fn logged(program: &str) -> Option<(Firmware, Vec<String>)> {
     require(both)
 }
 
-/// The number before "instructions" in the line that starts with `subject`.
+/// Returns the number before "instructions" in the line that starts with `subject`.
 fn instructions(lines: &[String], subject: &str) -> u32 {
     let line = lines.iter().find_map(|line| line.strip_prefix(subject));
     line.and_then(|line| line.split_once(" instructions"))

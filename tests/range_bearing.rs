@@ -7,7 +7,7 @@ use minimal_surprise_link::{WIRE_BYTES_MAX, encode};
 use proptest::prelude::*;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-/// A frame with exactly these bytes as its message.
+/// Encodes a frame with exactly these bytes as its message.
 fn frame(message: &[u8]) -> Vec<u8> {
     let mut wire = [0; WIRE_BYTES_MAX];
     let length = encode(&Raw(message), &mut wire).unwrap();

@@ -1,6 +1,6 @@
 //! Pictures of a run: `evolver replay` into SVG, PNG, GIF and MP4.
 //!
-//! `UPDATE_SNAPSHOTS=1` writes the files in `snapshots/` anew; check them before committing.
+//! `UPDATE_SNAPSHOTS=1` rewrites the files in `snapshots/`; check them before committing.
 
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX};
 use minimal_surprise_controller::{EncodedGenome, Provenance};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use tests::noisy_run::copy_noisy_run;
 use tests::program::{Evolver, Finished};
 
-/// A folder with a short run in `run`.
+/// Creates a folder with a short run in `run`.
 fn with_a_run() -> Evolver {
     let evolver = Evolver::in_empty_folder();
     let short = "evolve --population 6 --generations 3 --repetitions 2 --steps 60 --robots 60 \
@@ -43,7 +43,7 @@ fn assert_ended(run: &Finished, code: i32, words: &[&str]) {
     assert_eq!(run.stderr.trim_end().lines().count(), 1, "{run:?}");
 }
 
-/// Red, green and blue of every pixel, by rows.
+/// Red, green and blue of every pixel, row by row.
 #[derive(Clone, PartialEq, Eq)]
 struct Pixels {
     width: usize,
@@ -72,7 +72,7 @@ fn png_pixels(bytes: &[u8]) -> (Pixels, Option<u32>) {
     (pixels, per_metre)
 }
 
-/// Every frame of a GIF as displayed, and its duration in hundredths of a second.
+/// Returns every frame of a GIF as displayed, and its duration in hundredths of a second.
 fn gif_frames(bytes: &[u8]) -> Vec<(Pixels, u16)> {
     let mut reader = gif::DecodeOptions::new().read_info(bytes).expect("a GIF");
     let width = usize::from(reader.width());
@@ -85,7 +85,7 @@ fn gif_frames(bytes: &[u8]) -> Vec<(Pixels, u16)> {
     };
     let mut frames = Vec::new();
     while let Some(frame) = reader.read_next_frame().expect("a whole GIF") {
-        assert!(frame.palette.is_none(), "the palette is the GIF's");
+        assert!(frame.palette.is_none(), "frames use the palette of the GIF");
         for (index, &colour) in frame.buffer.iter().enumerate() {
             if Some(colour) != frame.transparent {
                 let x = usize::from(frame.left) + index % usize::from(frame.width);
@@ -110,7 +110,7 @@ fn assert_as_kept(evolver: &Evolver, name: &str) {
     let file = snapshot(name);
     let made = evolver.read(name);
     if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
-        fs::write(&file, &made).expect("it can be written");
+        fs::write(&file, &made).expect("the file can be written");
     }
     let kept = fs::read(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
     let same = if name.ends_with(".png") {
@@ -120,11 +120,11 @@ fn assert_as_kept(evolver: &Evolver, name: &str) {
     };
     let there = std::env::temp_dir().join(name);
     if !same {
-        fs::write(&there, &made).expect("it can be written");
+        fs::write(&there, &made).expect("the file can be written");
     }
     assert!(
         same,
-        "{name} is not as in tests/snapshots; it is now in {}",
+        "{name} differs from tests/snapshots; the new picture is in {}",
         there.display()
     );
 }
@@ -194,16 +194,17 @@ fn predictions_and_curves_are_drawn_with_their_names_and_numbers() {
     }
     let predictions = evolver.text("predictions.svg");
     let averages = predictions.matches("aria-label=\"").count() - 1;
-    assert_eq!(averages, 14, "sensor model C has as many sensors");
+    assert_eq!(averages, 14, "number of sensors of model C");
 }
 
 const CELL: [u8; 3] = [0xf4, 0xf4, 0xf2];
 const LINE: [u8; 3] = [0xdc, 0xdc, 0xd8];
 const ROBOT: [u8; 3] = [0x2b, 0x2b, 0x29];
 
-/// The poses visible on a grid with cells of the given size in pixels, robots drawn plain.
+/// Reads the poses from a frame of a grid with cells of the given size in pixels, robots drawn
+/// plain.
 fn poses_seen(frame: &Pixels, cells: (usize, usize), side: usize) -> Vec<Pose> {
-    // The grid begins with a line.
+    // The first pixel of the grid belongs to a line.
     let corner = frame.rgb.iter().position(|&colour| colour == LINE);
     let corner = corner.expect("there is a grid");
     let (west, north) = (corner % frame.width, corner / frame.width);
@@ -216,7 +217,7 @@ fn poses_seen(frame: &Pixels, cells: (usize, usize), side: usize) -> Vec<Pose> {
                     north + (cells.1 - 1 - y) * side + down * side / 4,
                 )
             };
-            // East, north, west, south; the outline of a robot is notched at its back.
+            // East, north, west, south; the outline of a robot has a notch at the back.
             let around = [(3, 2), (2, 1), (1, 2), (2, 3)].map(|(x, y)| quarter(x, y));
             if quarter(2, 2) == ROBOT {
                 let ahead: Vec<usize> = (0..4)
@@ -277,7 +278,7 @@ fn every_frame_of_a_gif_shows_the_poses_of_its_state() {
 #[test]
 fn the_readme_opens_with_the_picture_that_its_first_commands_draw() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let readme = fs::read_to_string(root.join("README.md")).expect("there is one");
+    let readme = fs::read_to_string(root.join("README.md")).expect("the README can be read");
     let picture = readme.split_once("](docs/").expect("a picture").1;
     let picture = picture.split_once(')').expect("its end").0;
     let commands: Vec<&str> = readme
@@ -294,7 +295,7 @@ fn the_readme_opens_with_the_picture_that_its_first_commands_draw() {
     let kept = fs::read(root.join("docs").join(picture)).expect("the picture");
     assert!(
         kept == evolver.read(picture),
-        "{commands:?} draw another {picture}"
+        "{commands:?} draw a picture different from {picture}"
     );
 }
 
@@ -307,7 +308,7 @@ fn an_animation_has_about_a_hundred_frames_by_default() {
     replay(&evolver, "run --gif a.gif");
     assert_eq!(gif_frames(&evolver.read("a.gif")).len(), 89, "every fourth");
     replay(&evolver, "run --gif b.gif --every 350 --colour surprise");
-    // The last state has no readings that could surprise.
+    // In the last state, robots have no readings that could surprise them.
     assert_eq!(gif_frames(&evolver.read("b.gif")).len(), 2);
 }
 
@@ -326,7 +327,7 @@ fn a_replay_is_drawn_the_same_every_time() {
     }
 }
 
-/// A program that runs this script, in a separate folder.
+/// Installs a script as `ffmpeg` in a separate folder, and returns the folder's path.
 #[cfg(unix)]
 fn stand_in(evolver: &Evolver, script: &str) -> String {
     use std::os::unix::fs::PermissionsExt;
@@ -342,7 +343,7 @@ fn stand_in(evolver: &Evolver, script: &str) -> String {
 #[test]
 fn ffmpeg_gets_the_frames_of_the_gif() {
     let evolver = with_a_run();
-    // Its last argument is the file; only shell builtins and programs in /bin are needed.
+    // The last argument is the file; the script needs only shell builtins and programs in /bin.
     let keeps = "#!/bin/sh\nfor file; do :; done\n/bin/cat > \"$file\"\n";
     let path = stand_in(&evolver, keeps);
     let flags = "replay run --gif a.gif --mp4 a.mp4 --every 20 --fps 7";
@@ -369,7 +370,7 @@ fn without_ffmpeg_there_is_no_mp4_and_a_message_says_what_to_install() {
         &run,
         &["--mp4 = a.mp4", "ffmpeg", "apt-get install", "--gif"],
     );
-    // Nothing else is written either.
+    // No other file is written either.
     let both = words("replay run --gif a.gif --svg a.svg --mp4 a.mp4");
     let run = evolver.run_with(("PATH", "/nowhere"), &both);
     assert_refused(&run, &["--mp4 = a.mp4", "ffmpeg"]);
@@ -455,7 +456,7 @@ fn requests_for_what_a_run_does_not_have_are_refused() {
         assert_refused(&run, words_of_it);
         assert!(!evolver.folder().join("a").exists(), "{line}");
     }
-    // Flags of pictures without a picture.
+    // Flags for pictures, without a picture.
     for flag in ["--at 3", "--every 2", "--what state", "--dpi 200"] {
         let run = evolver.run(&words(&format!("replay run {flag}")));
         assert_eq!(run.code, Some(2), "{run:?}");
@@ -475,7 +476,7 @@ fn an_incomplete_run_directory_is_refused() {
             None => fs::remove_file(&path).unwrap(),
         }
         let run = evolver.run(&words("replay run --svg a.svg"));
-        // Without it the run is incomplete; any other missing file is damage.
+        // Without DONE, the run is incomplete; any other missing file is damage.
         let code = if file == "DONE" { 2 } else { 1 };
         assert_ended(&run, code, words_of_it);
         fs::write(&path, good).unwrap();
@@ -703,7 +704,7 @@ fn a_damaged_swarm_is_named_after_its_structure_before_the_damage() {
     let classified: serde_json::Value =
         serde_json::from_str(&classified.stdout).expect("it is JSON");
     let name = classified["names"][0].as_str().expect("it has a name");
-    // If most of a swarm is removed, the rest is too small to name it after.
+    // If most of a swarm is removed, the rest is too small to have a dominant structure.
     replay(&evolver, "run --remove 0,0,14,11 --svg a.svg --html a.html");
     assert!(
         evolver
@@ -733,7 +734,7 @@ fn a_run_with_the_genome_or_the_state_of_another_run_is_refused_by_every_replay(
         "0"
     };
     other_hash.replace_range(hash_at..=hash_at, digit);
-    let steps = "best.genome does not take the steps that final.json records";
+    let steps = "best.genome does not repeat the steps recorded in final.json";
     let spoilt = [
         ("best.genome", evolver.read("other/best.genome"), steps),
         (
@@ -780,7 +781,7 @@ fn a_noisy_run_of_the_first_version_is_checked_with_the_bits_that_it_hashed() {
         let run = evolver.run(&words(line));
         assert_eq!(run.code, Some(0), "{line}: {run:?}");
     }
-    // The same hash, declared as version 2, belongs to a different run.
+    // Declared as version 2, the same hash belongs to a different run.
     let state = evolver.text("run/final.json");
     let state = state.replace("\"steps_hash\"", "\"steps_hash_v2\"");
     evolver.write("run/final.json", state.as_bytes());

@@ -1,4 +1,5 @@
-//! Replays in the terminal: the program in a pseudo-terminal, real keys, and what the screen shows.
+//! Replays in the terminal: the program runs in a pseudo-terminal, with real keys and a real
+//! screen.
 #![cfg(unix)]
 
 use minimal_surprise_controller::{Controller, EncodedGenome, State};
@@ -9,10 +10,10 @@ use serde_json::Value;
 use tests::program::{Evolver, Finished, Profile};
 use tests::terminal::{Terminal, close_terminal_of};
 
-/// The default size of a terminal window.
+/// Default size of a terminal window.
 const WINDOW: (u16, u16) = (24, 80);
 
-/// Rows above the swarm.
+/// Number of rows above the swarm.
 const TITLE: usize = 2;
 
 const RIGHT: &str = "\x1b[C";
@@ -27,7 +28,7 @@ const CTRL_C: &str = "\x03";
 const EVALUATE: &str = "evaluate run --starts 2 --steps 20";
 const STATUS: &str = "suite own.toml status --out suite";
 
-/// A folder with a short run in `run`, and a suite.
+/// Creates a folder with a short run in `run`, and a suite.
 fn with_a_run() -> Evolver {
     let evolver = Evolver::built(Profile::Debug);
     let run = evolver.run(&evolve("run").collect::<Vec<_>>());
@@ -43,7 +44,7 @@ fn evolve(out: &str) -> impl Iterator<Item = &str> {
     flags.split(' ').chain([out])
 }
 
-/// All states of the run, read from its exported trajectory.
+/// Returns all states of the run, read from its exported trajectory.
 fn states(evolver: &Evolver) -> Trajectory {
     let exported = evolver.run(&["export", "run", "--format", "trajectory"]);
     assert_eq!(exported.code, Some(0), "{exported:?}");
@@ -64,14 +65,15 @@ fn assert_refused(run: &Finished, words: &[&str]) {
     assert_eq!(run.stdout, "", "{run:?}");
 }
 
-/// The contents of a cell on the screen: the mark to its left, and the character in it.
+/// Returns the contents of a cell on the screen: the mark on the left, and the character in the
+/// cell.
 fn cell(terminal: &Terminal, grid: Grid, x: u16, y: u16) -> (String, String) {
     let row = TITLE as u16 + grid.height() - 1 - y;
     let at = |column| terminal.screen().cell(row, column).unwrap().contents();
     (at(2 * x).to_owned(), at(2 * x + 1).to_owned())
 }
 
-/// The swarm on the screen, with filled arrows.
+/// Returns the swarm on the screen, with filled arrows.
 fn swarm(terminal: &Terminal, grid: Grid) -> String {
     let arrows = [("▷▸", "▶"), ("△▴", "▲"), ("◁◂", "◀"), ("▽▾", "▼")];
     let rows = (0..grid.height()).rev().map(|y| {
@@ -87,7 +89,7 @@ fn swarm(terminal: &Terminal, grid: Grid) -> String {
     rows.collect::<Vec<_>>().join("\n")
 }
 
-/// The step shown on the screen.
+/// Returns the step shown on the screen.
 fn step(terminal: &Terminal) -> usize {
     let rows = terminal.rows();
     let line = rows.iter().find(|row| row.contains(" of 60 ")).unwrap();
@@ -161,7 +163,7 @@ fn playing_moves_the_robots_and_ends_at_the_last_state() {
     terminal.after("-", "  5/s");
     terminal.after("+++++", "200/s");
     terminal.after("9 ", "paused  200/s  step 60 of 60");
-    // From the end it starts again.
+    // At the end, playing starts again from the beginning.
     terminal.after("----", " 10/s");
     terminal.after(" ", "playing  10/s  step  1 of 60");
     terminal.types("q");
@@ -213,7 +215,7 @@ fn a_selected_robot_shows_what_it_senses_and_what_it_had_predicted() {
     terminal.after("p", "robot 1 at");
     terminal.after(END, "expects");
     assert!(terminal.screen().contents().contains('○'));
-    // If another key followed at once, Escape would be read as part of that key.
+    // Without a pause, Escape and the next key would be read as a single key.
     terminal.types(ESCAPE);
     terminal.wait_while("robot 1 at");
     terminal.after(HOME, "step  0 of 60");
@@ -239,7 +241,7 @@ fn a_window_smaller_than_the_grid_says_which_part_it_shows_and_scrolls() {
     terminal.after("n", "cropped");
     terminal.after(RIGHT, "step  1 of 60");
     terminal.after(LEFT, "step  0 of 60");
-    // The arrow in reverse video is the robot.
+    // The robot is the arrow in reverse video.
     let inverse = |terminal: &Terminal| {
         let mut cells = (0..60).flat_map(|x| (0..12).map(move |y| (y, x)));
         cells.any(|(y, x)| {
@@ -377,7 +379,7 @@ fn without_a_terminal_nothing_is_evolved_or_played() {
     assert_eq!(evolver.files(), before);
 }
 
-/// Runs the program to its end in a terminal with these variables; returns its exit code and
+/// Runs the program to completion in a terminal with these variables; returns its exit code and
 /// output.
 fn ended_in(
     evolver: &Evolver,
@@ -477,14 +479,14 @@ fn every_command_works_in_windows_of_any_size() {
         assert_eq!(terminal.ended(), 0, "{rows}x{columns}");
         assert!(terminal.is_restored(), "{rows}x{columns}");
     }
-    // A progress bar leaves nothing behind, even if it was truncated.
+    // A progress bar leaves no text behind, even if it was truncated.
     let arguments: Vec<&str> = evolve("narrow").collect();
     let mut terminal = Terminal::start(&evolver, (40, 20), &[], &arguments);
     assert_eq!(terminal.ended(), 0);
     let rows = terminal.rows().join("\n");
     assert!(!rows.contains("/2  best"), "{rows}");
     assert!(rows.contains("(a 15x15 grid is too"), "{rows}");
-    // Only the drawing is left out.
+    // The small terminal leaves out only the drawing.
     let piped = evolver.run(&evolve("piped").collect::<Vec<_>>()).stdout;
     let piped = piped.replace("piped", "narrow");
     assert_tells_all(&terminal.sent(), &piped, &["fitness", "hash"]);
@@ -494,7 +496,8 @@ fn every_command_works_in_windows_of_any_size() {
     assert_tells_all(&sent, &piped, &["fitness", "clustering"]);
 }
 
-/// Asserts that a terminal shows all lines that go through a pipe, including these words.
+/// Asserts that a terminal shows all lines that the program prints to a pipe, including these
+/// words.
 fn assert_tells_all(sent: &str, piped: &str, words: &[&str]) {
     for word in words {
         assert!(piped.contains(word), "no {word:?} in {piped}");

@@ -1,4 +1,4 @@
-//! The robot's control loop on a mock board: it is safe by itself.
+//! The robot's control loop on a mock board: it is safe without a host.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use firmware_example::memory_flash::MemoryFlash;
@@ -12,7 +12,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// What the robot does to its board and its flash.
+/// An operation of the robot on its board or its flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Event {
     Drive(Motion),
@@ -25,7 +25,7 @@ type Events = Rc<RefCell<Vec<Event>>>;
 
 #[derive(Debug, Default)]
 struct TestBoard {
-    /// What the detector delivers in the next period: nothing, or whether there is a robot ahead.
+    /// Detector reading of the next period: none, or whether a robot is ahead.
     reading: Option<bool>,
     arriving: VecDeque<u8>,
     period: bool,
@@ -36,7 +36,7 @@ struct TestBoard {
 }
 
 impl TestBoard {
-    /// Events since the last call.
+    /// Returns the events since the last call.
     fn events(&mut self) -> Vec<Event> {
         self.events.take()
     }
@@ -132,7 +132,7 @@ fn start(memory: MemoryFlash) -> TestRobot {
     Robot::start(board, TestFlash { memory, events }, 0).unwrap()
 }
 
-/// The container of a genome that always goes straight: all action weights make the output
+/// Returns the container of a genome that always goes straight: all action weights make the output
 /// negative.
 fn straight() -> Vec<u8> {
     let topology = Topology::default();
@@ -141,7 +141,7 @@ fn straight() -> Vec<u8> {
     let weights = (0..topology.weights()).map(|index| {
         let outputs = 2 * inputs + hidden * shape.hidden_row();
         match index {
-            // Thresholds of −1 make every input neuron positive, whatever it senses.
+            // Thresholds of −1 make every input neuron positive, whatever the readings.
             index if index < 2 * inputs => [0, -4096][index % 2],
             index if index < outputs => 4096,
             index if index < outputs + hidden => -4096,
@@ -161,7 +161,7 @@ fn robot_that_goes_straight() -> TestRobot {
     start(slots.release())
 }
 
-/// A robot without a genome, which turns clockwise.
+/// Returns a robot without a genome, which turns clockwise.
 fn robot_that_turns() -> TestRobot {
     start(MemoryFlash::new())
 }
@@ -248,7 +248,7 @@ fn the_motors_are_stopped_before_an_erase_and_stay_stopped_during_writes() {
     ask(&mut robot, 1, &[Request::Start]);
     assert_eq!(period(&mut robot, Some(false)), Some(Motion::Right));
     robot.board().events();
-    // Refused because the robot is running.
+    // Rejected because the robot is running.
     ask(&mut robot, 2, &requests);
     assert_eq!(robot.board().events(), []);
 
@@ -263,7 +263,7 @@ fn the_motors_are_stopped_before_an_erase_and_stay_stopped_during_writes() {
         written.iter().all(|event| *event == Event::Write),
         "{written:?}"
     );
-    // The update brought a genome that goes straight.
+    // The update installed a genome that goes straight.
     ask(&mut robot, 5, &[Request::Start]);
     assert_eq!(period(&mut robot, Some(false)), Some(Motion::Ahead));
 }
@@ -294,7 +294,7 @@ fn communication_does_not_feed_the_watchdog() {
     assert_eq!(robot.board().events(), []);
 }
 
-/// The faults in the robot's identity, and those in its telemetry.
+/// Returns the faults in the robot's identity, and those in its telemetry.
 fn faults(robot: &mut TestRobot) -> [Faults; 2] {
     let mut client = Client::new(1, 1);
     [Request::Identify, Request::Telemetry].map(|request| {
@@ -310,7 +310,7 @@ fn faults(robot: &mut TestRobot) -> [Faults; 2] {
             Reply::Telemetry { report, .. } => Some(report.faults),
             _ => None,
         });
-        said.expect("an answer")
+        said.expect("a reply")
     })
 }
 

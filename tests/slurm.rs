@@ -1,4 +1,4 @@
-//! Suites on a real Slurm with three nodes, which die, terminate tasks and restart them.
+//! Suites on a real Slurm with three nodes, which fail, terminate tasks and restart them.
 //!
 //! Runs only with `TEST_ALL=1`, as root, and if Slurm is installed.
 #![cfg(target_os = "linux")]
@@ -16,7 +16,7 @@ use tests::full;
 use tests::program::{Evolver, Finished};
 use tests::tools::{self, Missing};
 
-/// Runs of a few seconds for each of three tasks.
+/// A suite that keeps each of three tasks busy for a few seconds.
 const SUITE: &str = "
 name = \"own\"
 
@@ -31,13 +31,13 @@ repetitions = 4
 steps = 300
 ";
 
-/// Maximum duration of any operation. A dead node's task is restarted after half a minute.
+/// Maximum duration of any operation. A failed node's task is restarted after half a minute.
 const PATIENCE: Duration = Duration::from_secs(180);
 
-/// Only one cluster at a time: two would be slower.
+/// Allows only one cluster at a time: two would be slower.
 static ONE_CLUSTER: Mutex<()> = Mutex::new(());
 
-/// A cluster. Dropping it, or the death of this process, ends it and everything that runs on it.
+/// A cluster. Dropping it, or the end of this process, stops it and everything that runs on it.
 struct Slurm {
     script: Child,
     input: Option<ChildStdin>,
@@ -47,14 +47,14 @@ struct Slurm {
 }
 
 impl Slurm {
-    /// A cluster in a new folder; `None` if the test is skipped.
+    /// Starts a cluster in a new folder; returns `None` if the test is skipped.
     fn start(folder: &Path) -> Option<Self> {
         if !full::all_cases() {
             println!("SKIPPED: runs with TEST_ALL=1 only");
             return None;
         }
         tools::require(installed())?;
-        // A failed test that held the lock has still ended its cluster.
+        // A failed test that held the lock has still stopped its cluster.
         let one = ONE_CLUSTER.lock().unwrap_or_else(|e| e.into_inner());
         let free = [(); 4].map(|()| TcpListener::bind("127.0.0.1:0").expect("a free port"));
         let ports = free.map(|port| port.local_addr().expect("it is bound").port());
@@ -91,14 +91,14 @@ impl Slurm {
         assert_eq!(answer.as_deref(), Ok(expected), "the cluster's script");
     }
 
-    /// `kill` or `start` a node.
+    /// Executes `kill` or `start` on a node.
     fn node(&mut self, verb: &str, name: &str) {
-        let input = self.input.as_mut().expect("it is open until the drop");
+        let input = self.input.as_mut().expect("open until the drop");
         writeln!(input, "{verb} {name}").expect("the script reads");
         self.expect_answer("done");
     }
 
-    /// The output of a Slurm command.
+    /// Returns the output of a Slurm command.
     fn ask(&self, command: &[&str]) -> String {
         let output = Command::new("timeout")
             .arg("60")
@@ -110,7 +110,7 @@ impl Slurm {
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
-    /// State, node and reason of the array's tasks that have not ended, by their numbers.
+    /// Returns the state, node and reason of the array's unfinished tasks, by task number.
     fn tasks(&self, job: &str) -> BTreeMap<u32, [String; 3]> {
         let format = "--format=%K|%T|%N|%r";
         let text = self.ask(&["squeue", "--noheader", "--array", "--jobs", job, format]);
@@ -123,7 +123,7 @@ impl Slurm {
             .collect()
     }
 
-    /// Starts requeued tasks, which Slurm would delay by two minutes.
+    /// Starts requeued tasks, which Slurm would otherwise delay by two minutes.
     fn hurry(&self, job: &str) {
         for (task, [state, _, reason]) in self.tasks(job) {
             if state == "PENDING" && reason == "BeginTime" {
@@ -135,7 +135,7 @@ impl Slurm {
         }
     }
 
-    /// Exit code and state of a task, running or ended, and how often it was restarted.
+    /// Returns the properties of a running or finished task, such as exit code, state and restarts.
     fn task(&self, job: &str, task: u32) -> BTreeMap<String, String> {
         let text = self.ask(&[
             "scontrol",
@@ -158,7 +158,7 @@ impl Slurm {
         evolver.run_with(("SLURM_CONF", conf.as_ref()), arguments)
     }
 
-    /// Submits the suite as the given number of tasks; returns the job's number.
+    /// Submits the suite as the given number of tasks; returns the job number.
     fn submit(&self, evolver: &Evolver, shards: &str) -> String {
         let submit = format!("suite own.toml submit --engine slurm --shards {shards} --out suite");
         let run = self.evolver(evolver, &submit.split(' ').collect::<Vec<_>>());
@@ -177,7 +177,7 @@ impl Drop for Slurm {
                 text.lines().skip(from).for_each(|line| println!("{line}"));
             }
         }
-        // The script ends everything when its input ends.
+        // The script stops everything when its input ends.
         self.input = None;
         let _ = self.script.wait();
     }
@@ -190,7 +190,7 @@ fn installed() -> Result<(), Missing> {
         )))
     };
     for program in ["slurmctld", "slurmd", "sbatch", "munged"] {
-        // It only has to start: without a cluster, some commands fail.
+        // The program only has to start: without a cluster, some commands fail.
         if Command::new(program).arg("-V").output().is_err() {
             return missing(&format!(
                 "{program} (packages slurmctld slurmd slurm-client munge)"
@@ -210,14 +210,11 @@ fn installed() -> Result<(), Missing> {
     }
 }
 
-/// Polls until the condition holds.
+/// Polls until the condition is true.
 fn until(what: &str, mut is_so: impl FnMut() -> bool) {
     let started = Instant::now();
     while !is_so() {
-        assert!(
-            started.elapsed() < PATIENCE,
-            "this does not come true: {what}"
-        );
+        assert!(started.elapsed() < PATIENCE, "timed out waiting for {what}");
         std::thread::sleep(Duration::from_millis(100));
     }
 }
@@ -234,7 +231,7 @@ fn status(evolver: &Evolver) -> String {
         .stdout
 }
 
-/// The one hash of a suite that is done.
+/// Returns the hash of a complete suite.
 fn hash(evolver: &Evolver) -> String {
     let status = status(evolver);
     assert!(status.contains("12 of 12 different runs done"), "{status}");
@@ -243,7 +240,7 @@ fn hash(evolver: &Evolver) -> String {
         .to_owned()
 }
 
-/// Every file of the runs except `meta.json`, which holds the command, and `time.json`.
+/// Reads all files of the runs except `meta.json`, which holds the command, and `time.json`.
 fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files
@@ -253,7 +250,7 @@ fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-/// The suite run on this machine alone.
+/// Runs the suite on this machine without Slurm.
 fn alone(threads: &str) -> Evolver {
     let evolver = with_the_suite();
     let run = [
@@ -270,7 +267,7 @@ fn alone(threads: &str) -> Evolver {
     evolver
 }
 
-/// The suite run by GNU parallel.
+/// Runs the suite with GNU parallel.
 fn parallel() -> Evolver {
     let evolver = with_the_suite();
     let task = "run-task --suite own.toml --out suite --threads 1 --shard {}/3";
@@ -304,7 +301,7 @@ fn a_node_that_dies_in_a_real_slurm_changes_no_byte() {
     };
     let evolver = with_the_suite();
     let job = slurm.submit(&evolver, "3");
-    // The tasks use copies.
+    // Changes to the suite's file do not affect the tasks, which use copies.
     evolver.write("own.toml", b"edited");
     until("a task on each node, and each with a run", || {
         let on_nodes = |task: &[String; 3]| task[0] == "RUNNING";
@@ -331,7 +328,10 @@ fn a_node_that_dies_in_a_real_slurm_changes_no_byte() {
         .files()
         .into_iter()
         .filter(|file| file.ends_with("/DONE"));
-    assert!(own.count() < 12, "it was in the middle of it");
+    assert!(
+        own.count() < 12,
+        "the node failed before all runs were complete"
+    );
 
     let (one, two, parallel) = (alone("1"), alone("2"), parallel());
     assert_same(&two, &one, "two threads");
@@ -372,9 +372,9 @@ fn tasks_that_a_real_slurm_terminates_and_requeues_continue_without_loss() {
             .iter()
             .any(|file| file.ends_with("/checkpoint"))
     });
-    // As at a time limit.
+    // The same signal as at a time limit.
     slurm.ask(&["scancel", "--signal=TERM", "--batch", &format!("{job}_0")]);
-    until("the end of what was terminated", || {
+    until("the end of the terminated task", || {
         !slurm.tasks(&job).contains_key(&0)
     });
     let ended = slurm.task(&job, 0);
@@ -385,7 +385,7 @@ fn tasks_that_a_real_slurm_terminates_and_requeues_continue_without_loss() {
             .contains("interrupted")
     );
 
-    // While it runs, and while other tasks run.
+    // Requeues a task that has ended, and one that may still be running.
     slurm.ask(&["scontrol", "requeue", &format!("{job}_0")]);
     slurm.ask(&["scontrol", "requeue", &format!("{job}_1")]);
     until("the array's end", || {
@@ -410,7 +410,7 @@ fn tasks_that_a_real_slurm_terminates_and_requeues_continue_without_loss() {
         assert_eq!(ended["ExitCode"], "0:0", "{ended:?}");
         assert_eq!(ended["Restarts"], "1", "{ended:?}");
     }
-    assert_same(&evolver, &one, "after a requeue of what was done");
+    assert_same(&evolver, &one, "after a requeue of a complete task");
 }
 
 #[test]
@@ -428,7 +428,7 @@ fn a_shard_that_a_real_slurm_runs_twice_at_once_gives_the_result_of_one() {
         let runs_now =
             |tasks: &BTreeMap<u32, [String; 3]>| tasks.values().any(|task| task[0] == "RUNNING");
         at_once |= tasks.iter().all(runs_now);
-        // As on a file system without locks: no process sees the lock of another.
+        // As on a file system without locks, where no process sees the locks of others.
         for run in fs::read_dir(&runs).into_iter().flatten().flatten() {
             let _ = fs::remove_file(run.path().join(".lock"));
         }

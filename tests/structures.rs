@@ -1,8 +1,8 @@
 //! Compares our counts with those of the scripts published by the paper's authors, for the states
 //! in `fixtures/structures` (or in the file named by `STRUCTURES_FILE`).
 //!
-//! Our rules differ on purpose in two points, both about the edge of the torus. [`EdgeRules`] also
-//! implements the scripts' rules, so that a difference can be attributed to one of them.
+//! Our rules differ on purpose in two points, both at the edge of the torus. [`EdgeRules`] also
+//! implements the scripts' rules, so that every difference can be attributed to a rule.
 
 use minimal_surprise_sim::scenario::random_poses;
 use minimal_surprise_sim::structures::{Structure, classify};
@@ -13,12 +13,12 @@ use tests::structures::{Counts, State, states};
 
 type Cell = (u16, u16);
 
-/// Rules at the edge of the torus. Ours: true, true. The scripts': false, false.
+/// Rules at the edge of the torus. Our rules: true, true. The scripts': false, false.
 #[derive(Clone, Copy)]
 struct EdgeRules {
     /// Neighbours beside a line or pair are adjacent across the edge.
     neighbours_adjacent_across: bool,
-    /// A run across the edge may still contain a line when outward robots are dropped from it. The
+    /// A run across the edge may still contain a line after its outward robots are dropped. The
     /// scripts lose the line if all robots before the edge are dropped.
     dropped_lines_stay_whole: bool,
 }
@@ -28,7 +28,7 @@ const OURS: EdgeRules = EdgeRules {
     dropped_lines_stay_whole: true,
 };
 
-/// Lines and pairs found cell by cell, slowly and independently of the library.
+/// An independent implementation, slow and simple, which finds lines and pairs cell by cell.
 struct PlainReading<'a> {
     grid: Grid,
     headings: BTreeMap<Cell, Heading>,
@@ -45,7 +45,7 @@ struct Track {
 }
 
 impl Track {
-    /// The cell at a position along the track, `aside` cells beside it.
+    /// Returns the cell at a position along the track, `aside` cells beside it.
     fn cell(self, grid: Grid, along: u16, aside: i32) -> Cell {
         if self.horizontal {
             grid.moved(along % self.length, self.across, 0, aside)
@@ -85,8 +85,8 @@ impl PlainReading<'_> {
         }
     }
 
-    /// The counts with the lines, pairs and dispersed robots of this reading; the other counts,
-    /// which the rules do not affect, come from the library.
+    /// Counts lines, pairs and dispersed robots independently; all other counts, which the rules do
+    /// not affect, come from the library.
     fn counts(&self) -> Counts {
         let structures = classify(self.grid, &self.state.poses).unwrap();
         let mut counts = Counts::of(&structures);
@@ -154,7 +154,7 @@ impl PlainReading<'_> {
         self.headings.get(&track.cell(self.grid, along, 0)).copied()
     }
 
-    /// Lines of a track as first position and length.
+    /// Returns the lines of a track as first position and length.
     fn lines(&self, track: Track) -> Vec<(u16, u16)> {
         let on_track = |along| {
             let heading = self.heading(track, along);
@@ -182,7 +182,8 @@ impl PlainReading<'_> {
             .collect()
     }
 
-    /// A run without the robots that point outward from its ends.
+    /// Returns a run without the robots that point outward from its ends; `None` if the scripts'
+    /// rules lose the line.
     fn dropped(&self, track: Track, first: u16, length: u16) -> Option<(u16, u16)> {
         if length == track.length {
             return Some((first, length));
@@ -198,7 +199,8 @@ impl PlainReading<'_> {
         (!lost).then_some((from, to - from))
     }
 
-    /// At most ⌈n/2⌉ neighbours beside n robots, no two of them adjacent.
+    /// Checks the cells beside n robots: at most ⌈n/2⌉ are occupied, and no two of these are
+    /// adjacent.
     fn side_is_free(&self, track: Track, first: u16, length: u16, aside: i32) -> bool {
         let beside = |along| self.occupied(track.cell(self.grid, along, aside));
         let count = (first..first + length)
@@ -217,7 +219,7 @@ impl PlainReading<'_> {
         count <= usize::from(length).div_ceil(2) && !adjacent
     }
 
-    /// Cells of the robots in pairs.
+    /// Returns the cells of the robots in pairs.
     fn pairs(&self, in_line: &BTreeSet<Cell>) -> BTreeSet<Cell> {
         let mut in_pair = BTreeSet::new();
         for track in self.tracks() {
@@ -238,7 +240,7 @@ impl PlainReading<'_> {
     }
 }
 
-/// The number of equal counts, the number of equal states, and the states that differ.
+/// Compares counts; returns the numbers of compared and equal counts, and the states that differ.
 fn compare(states: &[State], ours: impl Fn(&State) -> Counts) -> (usize, usize, Vec<&State>) {
     let (mut compared, mut equal, mut differing) = (0, 0, Vec::new());
     for state in states {
@@ -318,7 +320,7 @@ fn counts_and_verdicts_agree_with_the_authors_scripts_except_for_two_rules() {
     for ((name, rules), count) in explanations.iter().zip(explained) {
         let (compared, equal, _) = compare(&states, |s| PlainReading::new(s, *rules).counts());
         println!(
-            "  {count} explained by: {name} (so read, {equal} of {compared} equal: {:.2} %)",
+            "  {count} explained by: {name} (with this rule, {equal} of {compared} equal: {:.2} %)",
             100.0 * equal as f64 / compared as f64
         );
     }

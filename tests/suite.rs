@@ -1,5 +1,5 @@
-//! Suites, run as a user would run them: the result is the same on one machine or many, interrupted
-//! or not.
+//! Suites, run as a user would run them: the result is the same on one machine or several, with or
+//! without interruptions.
 
 use minimal_surprise_evolver::suite::plan::Plan;
 use minimal_surprise_evolver::suite::{Suite, report};
@@ -48,12 +48,12 @@ fn with_the_suite() -> Evolver {
     evolver
 }
 
-/// The hash of all runs, as printed by `status`.
+/// Returns the hash of all runs, as printed by `status`.
 fn hash_by_status(evolver: &Evolver) -> String {
     hash_by(evolver, &[])
 }
 
-/// The hash of some runs, as printed by `status`.
+/// Returns the hash of some runs, as printed by `status`.
 fn hash_by(evolver: &Evolver, choice: &[&str]) -> String {
     let status = ["suite", "own.toml", "status", "--out", "suite"];
     let status = evolver.run(&[&status[..], choice].concat());
@@ -63,7 +63,7 @@ fn hash_by(evolver: &Evolver, choice: &[&str]) -> String {
         .to_owned()
 }
 
-/// The hashes of an uninterrupted suite.
+/// Returns the hashes of an uninterrupted suite.
 fn expected() -> String {
     let evolver = with_the_suite();
     let run = evolver.run(&RUN);
@@ -71,7 +71,7 @@ fn expected() -> String {
     evolver.text("suite/hashes.txt")
 }
 
-/// The hashes of a suite that was run in shards, in the order of the whole suite.
+/// Returns the hashes of a suite that was run in shards, in the order of the whole suite.
 fn hashes_after(evolver: &Evolver) -> String {
     let run = evolver.run(&RUN);
     assert_eq!(run.code, Some(0), "{run:?}");
@@ -89,7 +89,7 @@ fn assert_refused(run: &Finished, words: &[&str]) {
 fn kills_at_random_moments_change_no_hash() {
     let least = if full::all_cases() { 100 } else { 15 };
     let seed = 6;
-    println!("seed of the moments: {seed}");
+    println!("seed of the kill times: {seed}");
     let mut moments = ChaCha8Rng::seed_from_u64(seed);
     let whole = with_the_suite();
     let started = Instant::now();
@@ -108,7 +108,7 @@ fn kills_at_random_moments_change_no_hash() {
                 break;
             }
             kills += 1;
-            assert!(kills < 100_000, "it does not get anywhere");
+            assert!(kills < 100_000, "the suite makes no progress");
         }
         assert_eq!(hashes_after(&evolver), expected);
         let parts: Vec<String> = evolver
@@ -184,7 +184,7 @@ fn gnu_parallel_runs_the_shards() {
         .args([":::", "0", "1", "2", "3"])
         .current_dir(evolver.folder())
         .output()
-        .expect("it has just answered");
+        .expect("GNU parallel is installed");
     assert!(output.status.success(), "{output:?}");
     let by_status = hash_by_status(&evolver);
     assert_eq!(hashes_after(&evolver), expected());
@@ -208,7 +208,7 @@ fn a_task_succeeds_only_when_its_shard_is_done() {
             let task = scope.spawn(|| evolver.run(&task));
             std::thread::sleep(Duration::from_millis(patience));
             other.kill();
-            task.join().expect("it does not panic")
+            task.join().expect("the task does not panic")
         });
         assert_eq!(run.code, Some(0), "{run:?}");
         assert!(run.stdout.contains("6 of 6 runs done"), "{run:?}");
@@ -216,8 +216,8 @@ fn a_task_succeeds_only_when_its_shard_is_done() {
     }
 }
 
-/// A folder with programs named like Slurm's, which record their arguments and print what Slurm
-/// would.
+/// Creates a folder with programs named like Slurm's, which record their arguments and print what
+/// Slurm would print.
 fn fake_slurm(evolver: &Evolver, sbatch: &str) -> String {
     let programs = [
         ("sbatch", sbatch),
@@ -260,7 +260,7 @@ fn a_queued_task_is_not_affected_by_later_edits_or_submissions() {
     let later = evolver.run_with(path, &SUBMIT);
     assert_eq!(later.code, Some(0), "{later:?}");
     let array = evolver.text("got.sh");
-    assert!(array.contains("--array=0-1\n"), "a task a run: {array}");
+    assert!(array.contains("--array=0-1\n"), "one task per run: {array}");
     for index in 0..5 {
         let task = Command::new("sh")
             .arg("suite/jobs/1/job.sh")
@@ -313,8 +313,8 @@ fn two_processes_share_the_work() {
     assert_eq!(hashes_after(&evolver), expected());
 }
 
-/// Every file of the runs except `meta.json` and `time.json`, which hold the command and the
-/// duration, and the leftovers of processes that were killed before a run had its name.
+/// Reads all files of the runs except `meta.json` and `time.json`, which hold the command and the
+/// duration, and the leftovers of processes killed before a run had its final name.
 fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files
@@ -336,7 +336,7 @@ fn processes_without_locks_leave_the_files_of_one() {
         let runs = evolver.folder().join("suite/runs");
         ended.store(false, Ordering::Relaxed);
         std::thread::scope(|scope| {
-            // As on a file system without locks: no process sees the lock of another.
+            // As on a file system without locks, where no process sees the locks of others.
             let remover = scope.spawn(|| {
                 let mut removed = 0;
                 while !ended.load(Ordering::Relaxed) {
@@ -350,12 +350,12 @@ fn processes_without_locks_leave_the_files_of_one() {
             let others = [(); 2].map(|()| scope.spawn(|| evolver.run(&RUN)));
             std::thread::sleep(Duration::from_millis(30));
             killed.kill();
-            let ends = others.map(|other| other.join().expect("it does not panic"));
+            let ends = others.map(|other| other.join().expect("the run does not panic"));
             ended.store(true, Ordering::Relaxed);
             for run in ends {
                 assert_eq!(run.code, Some(0), "{run:?}");
             }
-            removed += remover.join().expect("it does not panic");
+            removed += remover.join().expect("the remover does not panic");
         });
         assert_eq!(hashes_after(&evolver), alone.text("suite/hashes.txt"));
         assert!(contents(&evolver) == expected, "{:?}", evolver.files());
@@ -467,7 +467,7 @@ fn bad_suites_are_refused_with_the_position_of_the_error() {
         &evolver.run(&["run-task", "--shard", "0/3"]),
         &["--suite <FILE>"],
     );
-    assert_eq!(evolver.files(), ["own.toml"], "nothing was written");
+    assert_eq!(evolver.files(), ["own.toml"], "no file was written");
 }
 
 #[test]
@@ -480,7 +480,7 @@ fn an_unknown_engine_path_is_refused_before_anything_is_done() {
         let run = evolver.run_with((PATH_VARIABLE, "abacus"), arguments);
         assert_refused(&run, &[PATH_VARIABLE, "abacus", "portable"]);
     }
-    assert_eq!(evolver.files(), ["own.toml"], "nothing was written");
+    assert_eq!(evolver.files(), ["own.toml"], "no file was written");
 }
 
 #[test]
@@ -518,7 +518,7 @@ fn a_run_whose_lock_cannot_be_opened_is_named_and_the_others_are_done() {
     assert_eq!(hashes_after(&evolver), hashes);
 }
 
-/// A suite that searches for a structure that none of its runs has.
+/// Creates a suite that searches for a structure that none of its runs has.
 fn with_a_search() -> Evolver {
     let evolver = Evolver::in_empty_folder();
     let text = format!(
@@ -547,7 +547,7 @@ fn a_damaged_run_beyond_the_plan_is_named_and_only_ends_its_search() {
 #[test]
 fn a_suite_on_a_full_disk_says_so_and_is_resumed_when_there_is_room() {
     let evolver = with_the_suite();
-    // Enough bytes to start the suite, but too few inodes for its files.
+    // Enough space to start the suite, but too few inodes for its files.
     let Some(disk) = tools::require(Disk::mounted_at(
         evolver.folder().join("suite"),
         "8m,nr_inodes=30",
@@ -588,7 +588,7 @@ fn a_report_is_written_where_requested_and_replaces_only_a_report() {
     assert_eq!(report("said").code, Some(0));
 
     let (ours, kept) = (evolver.read("results/report.html"), b"dear");
-    // One of our pages alone does not make a directory a report.
+    // A report's page alone does not identify a directory as a report.
     fs::create_dir(evolver.folder().join("saved")).unwrap();
     evolver.write("saved/report.html", &ours);
     evolver.write("saved/mother.txt", kept);
@@ -683,7 +683,7 @@ fn all_damaged_runs_are_named_and_the_others_are_done_shown_and_reported() {
         .lines()
         .map(|line| format!("suite/runs/{}", &line[..16]))
         .collect();
-    // Truncated, with other contents, a directory instead of a file, missing; and one not done.
+    // Truncated, changed, replaced by a directory, missing; and one run not done.
     let state = evolver.text(&format!("{}/final.json", runs[0]));
     evolver.write(&format!("{}/final.json", runs[0]), &state.as_bytes()[..300]);
     evolver.write(&format!("{}/DONE", runs[1]), b"zzz\n");
@@ -777,7 +777,7 @@ fn a_report_without_runs_is_refused() {
     let report = ["suite", "own.toml", "report", "--out", "siute"];
     assert_refused(&evolver.run(&report), &["siute", "--out"]);
     assert_refused(&evolver.run(&["paper", "report"]), &["runs/paper", "--out"]);
-    assert_eq!(evolver.files(), ["own.toml"], "nothing was written");
+    assert_eq!(evolver.files(), ["own.toml"], "no file was written");
 }
 
 #[test]
@@ -820,7 +820,7 @@ fn after_tasks_the_command_that_searches_for_a_structure_is_printed() {
     assert!(!again.contains(command), "{again}");
 }
 
-/// The valid keys listed by the error for an unknown key.
+/// Returns the valid keys listed by the error for an unknown key.
 fn keys_said_with(suite: &str) -> Vec<String> {
     let error = Suite::parse(Path::new("own.toml"), suite).unwrap_err();
     let text = error.to_string();
@@ -849,7 +849,7 @@ fn every_key_of_a_suite_is_explained() {
             "" => "## The suite".to_owned(),
             table => format!("## `[[{table}]]`"),
         };
-        let (_, section) = docs.split_once(&heading).expect("a section a table");
+        let (_, section) = docs.split_once(&heading).expect("one section per table");
         let section = section.split("\n## ").next().unwrap_or_default();
         for key in keys {
             assert!(

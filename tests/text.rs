@@ -1,4 +1,4 @@
-//! Text from users: each encoding of it is decoded correctly by the program that reads it.
+//! Text from users: every program that reads an encoding of it decodes it correctly.
 
 use minimal_surprise_evolution::text::{
     self, FILE_NAME_BYTES_MAX, TextError, decode, file_name, file_name_except, html, is_hidden,
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tests::full::all_cases;
 
-/// Texts that have caused errors, or could.
+/// Texts that have caused errors or could cause errors.
 const HARD: [&str; 32] = [
     "",
     " ",
@@ -65,13 +65,13 @@ fn hard() -> impl Iterator<Item = String> {
     own.chain(["x".repeat(300), "é".repeat(300)])
 }
 
-/// Mostly characters with a special meaning in some format.
+/// Generates text that consists mostly of characters with a special meaning in some format.
 fn any_text() -> impl Strategy<Value = String> {
     let special = "[ -~\n\t\r\u{1b}\u{7f}\u{85}\u{200b}\u{202e}\u{2066}\u{feff}éß√▶]{0,12}";
     prop_oneof![special, "\\PC{0,12}", any::<String>(), "[a-b.-]{0,5}"]
 }
 
-/// Arguments have no zero bytes.
+/// Generates arguments, which have no zero bytes.
 fn any_bytes() -> impl Strategy<Value = Vec<u8>> {
     let some = prop::collection::vec(1..=255_u8, 0..12);
     prop_oneof![
@@ -104,7 +104,7 @@ fn check_file_name(text: &str) -> Result<(), TestCaseError> {
         prop_assert_ne!(
             file_name(&name),
             name,
-            "a text would have the name of another"
+            "the name could also belong to a different text"
         );
     } else {
         prop_assert!(text.bytes().all(|b| plain(b) || b"_.".contains(&b)));
@@ -119,7 +119,10 @@ fn a_file_name_is_short_portable_and_unique_to_its_text() {
     for text in hard().chain(twins.map(str::to_owned)) {
         check_file_name(&text).unwrap();
         let other = names.insert(file_name(&text).to_lowercase(), text.clone());
-        assert_eq!(other, None, "{text:?} has the name of another");
+        assert_eq!(
+            other, None,
+            "{text:?} has the same name as a different text"
+        );
     }
     proptest!(config(300), |(text in any_text(), other in any_text())| {
         check_file_name(&text)?;
@@ -161,7 +164,7 @@ fn invisible_characters_are_made_visible() {
     }
 }
 
-/// How `sh` reads each of some words.
+/// Returns the words as read by `sh`.
 fn read_by_sh(words: &[String]) -> Vec<Vec<u8>> {
     let script = format!(
         "for word in {}; do printf '%s\\0' \"$word\"; done",
@@ -249,14 +252,14 @@ fn a_page_shows_text_unchanged() {
     };
     hard().for_each(|text| check(&text));
     proptest!(config(300), |(text in any_text())| {
-        // Characters that XML does not allow.
+        // XML does not allow these characters.
         prop_assume!(!text.contains(['\u{fffe}', '\u{ffff}']));
         check(&text);
     });
 }
 
-/// The text of a Markdown document's only table row, heading or list item, and whether the document
-/// contains anything else.
+/// Returns the text of a Markdown document's only table row, heading or list item, and whether the
+/// document has any other contents.
 fn cells(document: &str) -> (Vec<String>, bool) {
     let (mut cells, mut inside, mut other) = (Vec::new(), false, false);
     for event in Parser::new_ext(
@@ -323,7 +326,7 @@ fn a_text_file_is_read_in_the_forms_that_programs_save() {
         assert_eq!(decode(bytes), Err(TextError::NotUtf8 { line, byte }));
     }
     proptest!(config(300), |(text in any_text())| {
-        // Text that begins with zeros is taken for UTF-16.
+        // Text that begins with zeros would be read as UTF-16.
         prop_assume!(!text.contains('\0'));
         let text = text.replace(['\r', '\u{feff}'], "");
         let windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));

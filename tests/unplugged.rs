@@ -1,8 +1,8 @@
-//! The robot's plug is pulled during `evolver flash`: QEMU is killed, at chosen flash operations and
-//! at random moments. `TEST_ALL=1` kills it more often.
+//! The robot is unplugged during `evolver flash`: QEMU is killed, at chosen flash operations and at
+//! random moments. `TEST_ALL=1` kills QEMU more often.
 //!
-//! A failure prints the number of the kill; kills depend only on [`SEED`] and their number, as far
-//! as the host's clock allows.
+//! A failure prints the number of the kill; kills depend only on [`SEED`] and their number, except
+//! for variations of the host's clock.
 
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, Provenance, encode};
 use minimal_surprise_controller::{
@@ -25,27 +25,27 @@ use tests::tools::{Missing, require};
 
 /// Seed of the genomes and of the kills.
 const SEED: u64 = 11;
-/// Kills, and kills with `TEST_ALL=1`.
+/// Number of kills, normally and with `TEST_ALL=1`.
 const KILLS: u32 = 40;
 const KILLS_ALL: u32 = 200;
-/// Bytes that the robot erases at a time, and in one step of an erase.
+/// Number of bytes per erase unit of the robot, and per step of an erase.
 const ERASE_BYTES: usize = 4096;
 const ERASE_STEP_BYTES: usize = 512;
-/// Bytes of a word of its flash.
+/// Number of bytes per word of the robot's flash.
 const WORD_BYTES: usize = 4;
 type Word = [u8; WORD_BYTES];
 const ERASED: Word = [0xff; WORD_BYTES];
 /// Offset of the write count in a slot's header.
 const WRITE_COUNT_AT: usize = 4;
-/// Longest to wait for a flash operation.
+/// Maximum wait for a flash operation.
 const OPERATION_WAIT: Duration = Duration::from_secs(20);
 
-/// When to pull the plug.
+/// Time of a kill.
 #[derive(Clone, Copy, Debug)]
 enum Kill {
     /// As soon as this step of the slot's erase is done.
     Erased { step: usize },
-    /// As soon as the word at this offset in the slot is written.
+    /// As soon as the word at this offset in the slot has been written.
     Written { at: usize },
     /// After this fraction of the duration of an update, in thousandths.
     After { thousandths: u32 },
@@ -77,13 +77,13 @@ impl SlotBytes {
         word
     }
 
-    /// Returns whether the word has changed since before the update.
+    /// Checks whether the word has changed since the start of the update.
     fn is_changed(&self, at: usize) -> bool {
         self.word(at) != self.before[at..at + WORD_BYTES]
     }
 
-    /// The last word erased by a step; at the slot's start the write count, because every header
-    /// begins with the same word.
+    /// Returns the last word erased by a step; at the slot's start the write count, because every
+    /// header begins with the same word.
     fn last_word(&self, step: usize) -> usize {
         let from = step * ERASE_STEP_BYTES;
         let mut words = (from..from + ERASE_STEP_BYTES).step_by(WORD_BYTES);
@@ -94,8 +94,9 @@ impl SlotBytes {
 }
 
 impl Kill {
-    /// Every second kill is at a flash operation. These kills are spread evenly over an update: the
-    /// steps of the erase, the words of the header, of the container, of the commit record.
+    /// Chooses a kill. Every second kill is at a flash operation. These kills are spread evenly
+    /// over an update: the steps of the erase, the words of the header, the container and the
+    /// commit record.
     fn choose(index: u32, kills: u32, container_bytes: usize) -> Self {
         if index % 2 == 1 {
             let mut rng = ChaCha8Rng::seed_from_u64(SEED + u64::from(index));
@@ -108,13 +109,13 @@ impl Kill {
                 .step_by(WORD_BYTES)
                 .map(|at| Self::Written { at })
         };
-        // Beyond the container an erase changes nothing.
+        // Beyond the container, an erase changes no bytes.
         let steps = (CONTAINER_AT as usize + container_bytes).div_ceil(ERASE_STEP_BYTES);
         let operations: Vec<Self> = (0..steps)
             .map(|step| Self::Erased { step })
             .chain(words(0, 16))
-            // Only a sample: each is equally dangerous, and there are far more of them than of the
-            // others.
+            // Only a sample: all words are equally critical, and the container has far more of them
+            // than the other parts.
             .chain(words(CONTAINER_AT, container_bytes).step_by(16))
             .chain(words(COMMIT_AT, 8))
             .collect();
@@ -122,12 +123,12 @@ impl Kill {
         operations[place]
     }
 
-    /// Waits for the moment.
+    /// Waits until the moment of the kill.
     fn wait(self, slot: &SlotBytes, update: Duration) {
         let overdue = Instant::now() + OPERATION_WAIT;
         let until = |is_there: &dyn Fn() -> bool| {
             while !is_there() {
-                assert!(Instant::now() < overdue, "{self:?} does not happen");
+                assert!(Instant::now() < overdue, "timed out waiting for {self:?}");
             }
         };
         match self {
@@ -159,7 +160,7 @@ impl Drop for Failing {
     }
 }
 
-/// The genome container of one generation, of any topology.
+/// Returns the genome container of one generation, of any topology.
 fn container(generation: u32) -> Vec<u8> {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED + u64::from(generation));
     // A network that predicts everything has the longest container, over which the kills are
@@ -181,7 +182,7 @@ fn container(generation: u32) -> Vec<u8> {
 /// A running robot.
 struct Robot {
     qemu: QemuRobot,
-    /// The genome it reported first.
+    /// The genome that the robot reported first.
     genome: GenomeInUse,
 }
 
@@ -192,7 +193,7 @@ impl Robot {
         Ok(Self { qemu, genome })
     }
 
-    /// Asserts that this genome makes the decisions.
+    /// Asserts that the robot decides as with this genome.
     fn must_run(&self, container: &[u8], running: bool, rng: &mut ChaCha8Rng) {
         let (mut line, in_use) = identify(&self.qemu, rng, running);
         assert!(is_in_use(in_use, container), "{in_use:?}");
@@ -227,7 +228,7 @@ impl Robot {
     }
 }
 
-/// Opens a session with a robot; returns it and the genome in use.
+/// Opens a session with a robot; returns the session and the genome in use.
 fn identify(qemu: &QemuRobot, rng: &mut ChaCha8Rng, running: bool) -> (Line, GenomeInUse) {
     let mut line = Line::open(&qemu.port, rng.next_u32()).unwrap();
     let identified = line.ask(&Request::Identify, |reply| match reply {
@@ -247,7 +248,7 @@ fn flash(evolver: &Evolver, port: &str, container: &[u8]) -> Finished {
     evolver.run(&["flash", "new.genome", "--port", port])
 }
 
-/// The offset in the file of the slot that a robot writes next.
+/// Returns the offset, in the file, of the slot that a robot writes next.
 fn slot_to_write(genome: GenomeInUse) -> u64 {
     match genome {
         GenomeInUse::Slot { slot: 0, .. } => slot_bytes(ERASE_BYTES) as u64,
@@ -255,13 +256,13 @@ fn slot_to_write(genome: GenomeInUse) -> u64 {
     }
 }
 
-/// The number of errors printed by a program.
+/// Returns the number of errors printed by a program.
 fn said(finished: &Finished) -> usize {
     let lines = finished.stderr.lines();
     lines.filter(|line| line.starts_with("error: ")).count()
 }
 
-/// Returns whether the genome in use is this one.
+/// Checks whether this genome is in use.
 fn is_in_use(genome: GenomeInUse, container: &[u8]) -> bool {
     matches!(genome, GenomeInUse::Slot { crc, .. } if Some(crc) == crc_of(container))
 }
@@ -280,7 +281,7 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
     };
     assert_eq!(robot.genome, GenomeInUse::BuiltIn);
     let mut old = container(0);
-    // Both slots have been used before the first kill, so there is something to erase.
+    // Both slots are used before the first kill, so that every update erases a slot.
     robot.update(&evolver, &container(u32::MAX));
     let mut update_time = robot.update(&evolver, &old);
     let mut slot = slot_bytes(ERASE_BYTES) as u64;
@@ -308,10 +309,10 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
         assert!(runs_new || runs_old, "{:?}", robot.genome);
         robot.must_run(if runs_new { &new } else { &old }, false, &mut rng);
         match flashed.code {
-            Some(0) => assert!(runs_new, "acknowledged, and gone"),
+            Some(0) => assert!(runs_new, "the acknowledged genome is lost"),
             Some(code @ (1 | 2)) => {
                 assert_eq!(said(&flashed), 1, "one clear message: {flashed:?}");
-                // The port disappeared before it was opened; only then is it bad input.
+                // Bad input only if the port disappeared before it was opened.
                 let no_port = flashed.stderr.contains("no such port");
                 assert_eq!(code == 2, no_port, "{flashed:?}");
                 unheard += u32::from(runs_new);
@@ -334,6 +335,6 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
          {unheard} of these unacknowledged; seed {SEED}",
         started.elapsed()
     );
-    // Otherwise the kills miss the update.
+    // Otherwise, the kills would miss the update.
     assert!(olds > kills / 2 && news > 0, "{olds} {news}");
 }

@@ -1,4 +1,4 @@
-//! Runs the target of `tests/fuzz/targets.rs` named by `FUZZ_TARGET`, guided by coverage.
+//! Runs the target of `tests/fuzz/targets.rs` named by `FUZZ_TARGET`, with coverage guidance.
 #![no_main]
 
 #[path = "../../tests/fuzz/targets.rs"]

@@ -34,7 +34,7 @@ const TOKENS: [&[u8]; 24] = [
     b"\xff\xfe",
 ];
 
-/// Input number `number` of a series: one of the seeds, changed in a few places.
+/// Returns mutant `number` of a series: one of the seeds, changed in a few places.
 pub(crate) fn mutant(seeds: &[Vec<u8>], series: u64, number: u64) -> Vec<u8> {
     let mut rng = ChaCha8Rng::seed_from_u64(series);
     rng.set_stream(number);

@@ -1,4 +1,4 @@
-//! The seeds of the corpus: small files as written by this program and the authors' program.
+//! Seeds of the corpus: small files as written by this program and the authors' program.
 
 use super::targets::{CHECKPOINT_SETTINGS, SESSION, tests_folder};
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX, Provenance};
@@ -22,7 +22,7 @@ use std::fs;
 
 type Seed = (&'static str, String, Vec<u8>);
 
-/// Target, name and bytes of every seed.
+/// Returns the target, name and bytes of every seed.
 pub(crate) fn seeds() -> Vec<Seed> {
     let mut seeds = Vec::new();
     let mut add = |target, name: &str, bytes: Vec<u8>| seeds.push((target, name.to_owned(), bytes));
@@ -133,7 +133,7 @@ fn experiment() -> Experiment {
     Experiment::new(Settings::resolve(&given, || 0).unwrap())
 }
 
-/// The text up to the second generation, which begins with a blank line or a header.
+/// Returns the text before the second generation, which begins with a blank line or a header.
 fn first_generation(text: &str) -> String {
     let end = text.find("\n\n").map_or(text.len(), |end| end + 2);
     text[..end].to_owned()
@@ -143,7 +143,7 @@ fn message(payload: &[u8]) -> Vec<u8> {
     [&[payload.len() as u8], payload].concat()
 }
 
-/// The messages of an update and some steps, and the robot's answers.
+/// Returns the requests of an update and some steps, and the robot's replies.
 fn conversation(container: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let (mut requests, mut replies) = (Vec::new(), Vec::new());
     let mut robot = LinkRobot::start(MockFlash::new());

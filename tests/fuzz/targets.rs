@@ -1,8 +1,8 @@
 //! Every reader of external bytes, as a function of arbitrary bytes.
 //!
-//! A target panics if a property does not hold: the reader accepts or refuses any bytes; what it
-//! accepts is within its ranges and, written again, is read back unchanged. If a checksum would
-//! refuse nearly all bytes, the target also tries them with a correct checksum.
+//! A target panics if a property does not hold: the reader accepts or rejects any bytes; accepted
+//! values are within their ranges and, written again, are read unchanged. If a checksum would cause
+//! nearly all bytes to be rejected, the target also tests them with a correct checksum.
 
 use firmware_example::range_bearing::RangeBearing;
 use minimal_surprise_controller::codec::{self, CRC_32C, CRC_BYTES, PREFIX_BYTES};
@@ -58,7 +58,7 @@ pub(crate) const TARGETS: [Target; 20] = [
 
 /// Maximum memory that a reader may use at once: a constant, plus an amount per byte of input.
 const MEMORY: (u64, u64) = (2 << 20, 500);
-/// Maximum memory that it may allocate in total, as a measure of its work.
+/// Maximum memory that a reader may allocate in total, as a measure of its work.
 const WORK: (u64, u64) = (8 << 20, 20_000);
 
 /// Runs a target and returns whether it accepted the bytes.
@@ -84,7 +84,7 @@ fn genome(bytes: &[u8]) -> bool {
     one_genome(&with_checksum(bytes)) || accepted
 }
 
-/// The bytes as a container with the correct length and checksum.
+/// Returns the bytes as a container with the correct length and checksum.
 fn with_checksum(bytes: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     if let Some(body) = bytes.len().checked_sub(CRC_BYTES)
@@ -106,14 +106,14 @@ fn one_genome(bytes: &[u8]) -> bool {
     let genome = encoded.to_genome();
     let mut buffer = [0; codec::CONTAINER_BYTES_MAX];
     let again = codec::encode(&genome, encoded.provenance(), &mut buffer).unwrap();
-    assert_eq!(again, bytes, "a container is the only one of its contents");
+    assert_eq!(again, bytes, "equal contents have equal containers");
     let controller = Controller::new(&genome);
     let mut state = minimal_surprise_controller::State::new(&controller);
     controller.step(&mut state, SensorBits::new(0xffff));
     true
 }
 
-/// Settings that the checkpoints of the corpus belong to.
+/// Settings of the checkpoints in the corpus.
 pub(crate) const CHECKPOINT_SETTINGS: &str = "grid = \"5x5\"\nrobots = 4\nsensor-model = \"b\"\n\
     noise = 0.0\npopulation = 3\ngenerations = 4\nrepetitions = 2\nsteps = 5\nmutation = 0.1\n\
     seed = 1\n";
@@ -123,7 +123,7 @@ thread_local! {
         read_settings(CHECKPOINT_SETTINGS.as_bytes()).expect("they are settings");
     /// A complete run, one file of which is replaced.
     static RUN: TempDir = copy_of_run();
-    /// The path of the file for readers that take a path.
+    /// Folder of the file for readers that take a path.
     static FOLDER: TempDir = tempfile::tempdir().unwrap();
 }
 
@@ -141,16 +141,16 @@ fn checkpoint(bytes: &[u8]) -> bool {
     let mut accepted = false;
     for experiment in experiments {
         let written = checkpoint::encode(&experiment, CHECKPOINT_SETTINGS);
-        let again = decode(&written).expect("what was written is read");
+        let again = decode(&written).expect("written bytes can be read");
         assert_eq!(checkpoint::encode(&again, CHECKPOINT_SETTINGS), written);
         accepted = true;
     }
     accepted
 }
 
-/// The folder of the files that targets start from.
+/// Returns the folder of the files that targets start from.
 pub(crate) fn tests_folder() -> PathBuf {
-    // The same folder from this package and from the package for coverage-guided fuzzing.
+    // The path must be the same in this package and in the package for coverage-guided fuzzing.
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     package.parent().unwrap().join("tests")
 }
@@ -174,7 +174,7 @@ fn run_file(name: &str, bytes: &[u8]) -> bool {
             assert!(error.to_string().contains("/"), "no path in {error}");
         }
         if let Ok(finished) = &read {
-            // Loading it reruns all its steps, so it is loaded only if that may find something.
+            // Checking repeats all steps, so it is done only for files that can make it fail.
             if ["best.genome", "final.json"].contains(&name) {
                 let _ = FinishedRun::read_and_check(run.path());
             }
@@ -190,7 +190,7 @@ fn run_file(name: &str, bytes: &[u8]) -> bool {
     })
 }
 
-/// The bytes as a file, for a reader that takes a path.
+/// Writes the bytes to a file, for a reader that takes a path.
 fn as_file<T>(bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
     FOLDER.with(|folder| {
         let path = folder.path().join("file");
@@ -293,7 +293,7 @@ fn drawing(bytes: &[u8]) -> bool {
     true
 }
 
-/// Messages one after the other: one byte with the length of each, then its bytes.
+/// Splits bytes into messages: one byte with the length of each, then its bytes.
 fn messages(mut bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     core::iter::from_fn(move || {
         let (&length, rest) = bytes.split_first()?;
@@ -303,7 +303,7 @@ fn messages(mut bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     })
 }
 
-/// A message as a frame on the line.
+/// Encodes a message as a frame on the line.
 fn framed(message: &[u8]) -> Vec<u8> {
     let crc = CRC_32C.checksum(message).to_le_bytes();
     let mut wire = vec![0; message.len() + FRAME_BYTES_MAX];
@@ -343,7 +343,7 @@ fn link_robot(bytes: &[u8]) -> bool {
         assert_eq!(
             answers(&mut server, &mut robot, &frame),
             first,
-            "a request that arrives twice is answered alike"
+            "a repeated request gets the same reply"
         );
         assert_eq!(robot.done, done, "a repeated request is executed only once");
         for answer in &first {
@@ -361,7 +361,7 @@ fn link_robot(bytes: &[u8]) -> bool {
     accepted
 }
 
-/// The session that the replies of the corpus belong to.
+/// Session of the replies in the corpus.
 pub(crate) const SESSION: u32 = 7;
 
 fn link_host(bytes: &[u8]) -> bool {
@@ -374,7 +374,7 @@ fn link_host(bytes: &[u8]) -> bool {
     let mut accepted = false;
     let mut feed = |byte: u8, pending: &mut bool| {
         if !*pending {
-            let request = requests.next().flatten().expect("they do not end");
+            let request = requests.next().flatten().expect("an endless sequence");
             client.request(&request).expect("nothing is pending");
             *pending = true;
         }

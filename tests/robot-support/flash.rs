@@ -7,15 +7,15 @@ use minimal_surprise_slots::{MappedFlash, SLOT_BYTES_MIN, slot_bytes};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// A chip with words of `W` bytes, read and written whole, that erases `E` bytes at a time.
+/// A chip with words of `W` bytes, which it reads and writes whole, and erase units of `E` bytes.
 ///
 /// Misuse panics: unaligned operations, a word written twice between two completed erases, an
-/// address out of bounds. Of erase units larger than a slot, only the bytes that a slot needs are
-/// stored, and only those may be used.
+/// address out of bounds. If erase units are larger than a slot, only the bytes that a slot needs
+/// are stored, and only these may be used.
 #[derive(Clone, Debug)]
 pub struct MockFlash<const W: usize, const E: usize> {
     bytes: Vec<u8>,
-    /// Whether each word may be written.
+    /// For each word, true if it may be written.
     erased: Vec<bool>,
     units: usize,
     cut: Option<Cut>,
@@ -27,24 +27,24 @@ pub struct MockFlash<const W: usize, const E: usize> {
 /// Counts of a flash's operations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Moments at which power could have failed.
+    /// Number of moments at which power could have failed.
     pub moments: u64,
     /// Number of writes.
     pub writes: u64,
-    /// Bytes written.
+    /// Number of bytes written.
     pub written_bytes: u64,
-    /// Units erased.
+    /// Number of erased units.
     pub erases: u64,
 }
 
-/// A future power cut.
+/// A power cut in the future.
 #[derive(Clone, Copy, Debug)]
 struct Cut {
     at_moment: u64,
     seed: u64,
 }
 
-/// The flash has no power.
+/// Error: the flash has no power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PowerCut;
 
@@ -54,7 +54,7 @@ impl NorFlashError for PowerCut {
     }
 }
 
-/// How an interrupted erase ends, in the order of its moments.
+/// Results of an interrupted erase, in the order of its moments.
 const TORN_ERASES: [TornErase; 5] = [
     TornErase::Untouched,
     TornErase::HalfErased,
@@ -73,16 +73,16 @@ enum TornErase {
 }
 
 impl<const W: usize, const E: usize> MockFlash<W, E> {
-    /// Bytes stored of each erase unit.
+    /// Number of bytes stored per erase unit.
     const KEPT: usize = if E < SLOT_BYTES_MIN {
         E
     } else {
         SLOT_BYTES_MIN
     };
-    /// Address of the slots: after one erase unit of other data.
+    /// Address of the slots, after one erase unit of other data.
     pub const OFFSET: u32 = E as u32;
 
-    /// An erased chip with one erase unit before the two slots.
+    /// Creates an erased chip with one erase unit before the two slots.
     #[must_use]
     pub fn new() -> Self {
         let units = 1 + 2 * slot_bytes(E) / E;
@@ -110,7 +110,7 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         flash
     }
 
-    /// Makes power fail after this many more moments; `seed` decides what is left in flash.
+    /// Makes power fail after this many more moments; `seed` determines the remaining contents.
     pub fn cut_power_after(&mut self, moments: u64, seed: u64) {
         self.cut = Some(Cut {
             at_moment: self.counts.moments + moments,
@@ -124,13 +124,13 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         self.cut = None;
     }
 
-    /// Flips bits, as ageing does.
+    /// Flips bits, as ageing can do.
     pub fn damage(&mut self, at: u32, mask: u8) {
         let place = Self::place(at, 1);
         self.bytes[place] ^= mask;
     }
 
-    /// The index of `length` bytes at an address among the stored bytes.
+    /// Returns the index of `length` bytes at an address within the stored bytes.
     fn place(at: u32, length: usize) -> usize {
         let at = at as usize;
         let (unit, within) = (at / E, at % E);
@@ -140,12 +140,12 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         let kept = Self::KEPT;
         assert!(
             within + length <= kept,
-            "{length} bytes at {at} are no slot's"
+            "{length} bytes at {at} are outside the slots"
         );
         unit * kept + within
     }
 
-    /// Returns whether power fails at this moment; the generator decides how.
+    /// Checks whether power fails at this moment; returns the generator for the remaining contents.
     fn fails_now(&mut self) -> Option<ChaCha8Rng> {
         let moment = self.counts.moments;
         self.counts.moments += 1;
@@ -180,8 +180,8 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         Ok(())
     }
 
-    /// The contents of a word whose write was interrupted at byte `whole`: the bytes before it are
-    /// written, the others have some of their bits, or any value.
+    /// Simulates a write interrupted at byte `whole` of a word: the bytes before it are written,
+    /// the others have some of their bits written, or any value.
     fn tear_word(word: &mut [u8], wanted: &[u8], whole: usize, rng: &mut ChaCha8Rng) {
         let anything = rng.next_u32() & 1 == 0;
         for (index, (byte, &wanted)) in word.iter_mut().zip(wanted).enumerate() {
@@ -264,14 +264,14 @@ impl<const W: usize, const E: usize> NorFlash for MockFlash<W, E> {
             self.bytes[place..place + W].copy_from_slice(wanted);
             self.counts.written_bytes += W as u64;
         }
-        // Written, but not reported.
+        // The write has finished, but may remain unreported.
         self.fails_now().map_or(Ok(()), |_| Err(PowerCut))
     }
 }
 
 impl<const W: usize, const E: usize> MappedFlash for MockFlash<W, E> {
     fn bytes(&self) -> &[u8] {
-        assert_eq!(Self::KEPT, E, "all of it is kept");
+        assert_eq!(Self::KEPT, E, "the whole unit is stored");
         &self.bytes
     }
 }

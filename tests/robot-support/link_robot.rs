@@ -1,4 +1,4 @@
-//! A robot behind a line, without wheels: slots in a mock flash and a controller.
+//! A robot without wheels on a serial line: slots in a mock flash and a controller.
 
 use crate::flash::MockFlash;
 use firmware_example::robot::{genome_in_use, refusal};
@@ -8,29 +8,29 @@ use minimal_surprise_controller::{
 use minimal_surprise_link::{Faults, GenomeInUse, Handler, Identity, Refusal, Report, Stepped};
 use minimal_surprise_slots::{Buffer, Slots};
 
-/// Its flash.
+/// Flash of the robot.
 pub type Flash = MockFlash<4, 4096>;
 
 /// The robot.
 #[derive(Debug)]
 pub struct LinkRobot {
-    /// The slots with its genomes.
+    /// Slots with the robot's genomes.
     pub slots: Slots<Flash>,
     room: Buffer,
     controller: Controller,
     state: State,
     report: Report,
-    /// The kernel that it reports.
+    /// Kernel that the robot reports.
     pub kernel: KernelId,
-    /// The step, counted from 0 since the last reset, in which its controller makes an error.
+    /// The step, counted from 0 since the last reset, in which the controller makes an error.
     pub errs_in_step: Option<u32>,
-    /// The genome that it reports as in use, if that is wrong on purpose.
+    /// The genome that the robot reports as in use, if wrong on purpose.
     pub claims_genome: Option<GenomeInUse>,
-    /// The report that it returns, if that is wrong on purpose; its steps return the same surprise.
+    /// The report that the robot returns, if wrong on purpose; its steps return the same surprise.
     pub claims_report: Option<Report>,
-    /// The request that it refuses, by its number among those carried out, and the refusal.
+    /// The request that the robot rejects, by its number among the executed ones, and the refusal.
     pub refuses: Option<(u64, Refusal)>,
-    /// Number of requests carried out, without identification and telemetry.
+    /// Number of executed requests, excluding identification and telemetry.
     pub done: u64,
 }
 
@@ -66,7 +66,7 @@ impl LinkRobot {
         self.slots.release()
     }
 
-    /// Runs one period of its control loop, if the loop is running.
+    /// Runs one period of the control loop, if the loop is running.
     pub fn period(&mut self, sensors: SensorBits) {
         if self.report.running {
             let decision = self.controller.step(&mut self.state, sensors);

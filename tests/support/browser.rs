@@ -1,5 +1,5 @@
-//! Headless Chromium, driven over its DevTools protocol: JSON with a zero byte after each message,
-//! through pipes, so that no port is opened.
+//! Headless Chromium, controlled through its DevTools protocol: JSON with a zero byte after each
+//! message, over pipes, so that no port is opened.
 
 use crate::tools::Missing;
 use serde_json::{Value, json};
@@ -29,7 +29,7 @@ pub struct Browser {
 /// Finds Chromium.
 ///
 /// # Errors
-/// [`Missing`] if it is not installed.
+/// [`Missing`] if Chromium is not installed.
 pub fn chromium() -> Result<PathBuf, Missing> {
     let folders = std::env::var_os("PATH").unwrap_or_default();
     let names = ["chromium", "chromium-browser", "google-chrome"];
@@ -43,7 +43,7 @@ impl Browser {
     /// Starts the browser.
     ///
     /// # Panics
-    /// If it does not start.
+    /// If Chromium does not start.
     #[must_use]
     pub fn start(chromium: &Path) -> Self {
         let profile = TempDir::new().expect("a temporary folder");
@@ -64,7 +64,7 @@ impl Browser {
                 "--disable-component-update",
                 "--no-first-run",
                 "--window-size=1280,900",
-                // No network, even if a page requests it.
+                // No network, even if a page requests one.
                 "--proxy-server=http://127.0.0.1:9",
                 "--host-resolver-rules=MAP * ~NOTFOUND",
                 "--remote-debugging-pipe",
@@ -74,7 +74,7 @@ impl Browser {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
-            .expect("a shell");
+            .expect("the shell starts");
         let requests = child.stdin.take().expect("it is piped");
         let mut answers = BufReader::new(child.stdout.take().expect("it is piped"));
         let (sender, messages) = channel();
@@ -117,7 +117,7 @@ impl Browser {
     /// Sends a command and waits for its result.
     ///
     /// # Panics
-    /// If there is no result, or it is an error.
+    /// If the result is missing or an error.
     pub fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.last_id += 1;
         let id = self.last_id;
@@ -148,7 +148,7 @@ impl Browser {
     /// Opens a file and waits until it is loaded.
     ///
     /// # Panics
-    /// If it does not load.
+    /// If the page does not load.
     pub fn open(&mut self, path: &Path) {
         let path = path
             .canonicalize()
@@ -160,10 +160,11 @@ impl Browser {
         self.wait_for(&loaded);
     }
 
-    /// The value of an expression on the page; if it is a promise, the value it resolves to.
+    /// Evaluates an expression on the page; if the value is a promise, returns the value it
+    /// resolves to.
     ///
     /// # Panics
-    /// If it throws, or has another type.
+    /// If the expression throws, or its value has a different type.
     pub fn evaluate<T: serde::de::DeserializeOwned>(&mut self, expression: &str) -> T {
         let mut result = self.call(
             "Runtime.evaluate",
@@ -180,7 +181,7 @@ impl Browser {
     /// Waits until an expression is true.
     ///
     /// # Panics
-    /// If it does not become true.
+    /// If the expression does not become true in time.
     pub fn wait_for(&mut self, expression: &str) {
         let deadline = Instant::now() + PATIENCE;
         while !self.evaluate::<bool>(expression) {
@@ -194,7 +195,7 @@ impl Browser {
         self.press_with(key, 0);
     }
 
-    /// [`Browser::press`] with Shift held.
+    /// Like [`Browser::press`], with Shift held.
     pub fn press_shifted(&mut self, key: &str) {
         self.press_with(key, 8);
     }
@@ -230,7 +231,7 @@ impl Browser {
         }
     }
 
-    /// Clicks at a point of the window.
+    /// Clicks a point of the window.
     pub fn click(&mut self, x: f64, y: f64) {
         for kind in ["mousePressed", "mouseReleased"] {
             let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "clickCount": 1 });
@@ -245,13 +246,13 @@ impl Browser {
         self.call("Emulation.setDeviceMetricsOverride", size);
     }
 
-    /// Checks that no page has reported errors so far, and that none requested anything except
-    /// files and data in the page.
+    /// Checks that no page has reported an error so far, and that none has requested anything
+    /// except files and data in the page.
     ///
     /// # Panics
-    /// If a page has.
+    /// If a page has reported an error or requested anything else.
     pub fn assert_quiet(&mut self) {
-        // All earlier events have arrived after this.
+        // All earlier events arrive before this reply.
         let _: bool = self.evaluate("true");
         for event in &self.events {
             let details = &event["params"];
@@ -284,8 +285,8 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // When asked to close, it waits for its other processes, so that none still writes to the
-        // profile when that is removed.
+        // When asked to close, Chromium waits for its other processes, so that none is writing to
+        // the profile when it is removed.
         let _ = self
             .requests
             .write_all(b"{\"id\":0,\"method\":\"Browser.close\"}\0");

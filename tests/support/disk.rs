@@ -36,7 +36,7 @@ impl Disk {
         let mounted = Command::new("mount").args(options).arg(&path).output();
         let mounted = mounted.is_ok_and(|output| output.status.success());
         let missing =
-            || Missing("mounting: it needs root, as in a container of its own".to_owned());
+            || Missing("mounting: it needs root, for example in a separate container".to_owned());
         if mounted {
             Ok(Self(path))
         } else {
@@ -44,10 +44,10 @@ impl Disk {
         }
     }
 
-    /// Remounts it with another option.
+    /// Remounts the file system with a different option.
     ///
     /// # Panics
-    /// If that fails.
+    /// If the file system cannot be remounted.
     pub fn remount(&self, option: &str) {
         let mounted = Command::new("mount")
             .args(["-o", &format!("remount,{option}")])

@@ -1,4 +1,4 @@
-//! Building the firmware programs and running them under QEMU.
+//! Builds the firmware programs and runs them under QEMU.
 
 use crate::tools::Missing;
 use defmt_decoder::{DecodeError, Table};
@@ -9,23 +9,24 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use std::{fs, thread};
 
-/// Exit code of `scripts/thumb-cargo.sh` if it finds no compiler.
+/// Exit code of `scripts/thumb-cargo.sh` if no compiler is found.
 const NO_COMPILER: i32 = 69;
 
-/// Maximum duration of a program. A program that has crashed may never end.
+/// Maximum run time of a program, because a program that has crashed may never exit.
 const TIMEOUT: Duration = Duration::from_secs(300);
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// The machine that `firmware-example/memory.x` describes, with a clock that advances by a fixed
-/// time per instruction.
+/// The machine described by `firmware-example/memory.x`, with a clock that advances by a fixed time
+/// per instruction.
 pub(crate) const QEMU: &str = "qemu-system-arm";
 const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 \
     -icount shift=10,align=off,sleep=off \
     -nographic -monitor none -serial none \
     -semihosting-config enable=on,target=native -kernel";
 
-/// QEMU's STM32F405: it has neither clock, timers nor pins, but traces writes to their registers.
+/// QEMU's STM32F405, which emulates neither clock, timers nor pins, but traces writes to their
+/// registers.
 const QEMU_STM32F4_ARGUMENTS: &str = "-machine netduinoplus2 \
     -nographic -monitor none -serial none -d unimp,int -D";
 
@@ -36,16 +37,16 @@ pub struct Firmware {
     pub compiler: String,
 }
 
-/// The folder of the package.
+/// Returns the folder of the package.
 #[must_use]
 pub fn directory() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware-example")
 }
 
-/// Builds all programs in release.
+/// Builds all programs in release mode.
 ///
 /// # Errors
-/// [`Missing`] if there is no compiler for the target.
+/// [`Missing`] if no compiler for the target is installed.
 ///
 /// # Panics
 /// If the programs do not compile.
@@ -66,21 +67,21 @@ pub fn build() -> Result<Firmware, Missing> {
 /// The result of linking a program.
 #[derive(Debug)]
 pub struct Linked {
-    /// Whether it was linked.
+    /// True if the program was linked.
     pub success: bool,
     /// The output of compiler and linker.
     pub messages: String,
 }
 
-/// Links a program of a package in `firmware-example` in release.
+/// Links a program of a package in `firmware-example` in release mode.
 ///
 /// # Errors
-/// [`Missing`] if there is no compiler for the target.
+/// [`Missing`] if no compiler for the target is installed.
 pub fn link(package: &str, program: &str) -> Result<Linked, Missing> {
     cargo_build(&["--package", package, "--bin", program])
 }
 
-/// Bytes of flash that a linked program takes: its sections that are loaded.
+/// Returns the bytes of flash used by a linked program: its loaded sections.
 ///
 /// # Panics
 /// If the program was not linked.
@@ -103,13 +104,13 @@ pub fn flash_bytes(program: &str) -> u32 {
         .sum()
 }
 
-/// The ELF file of a program that was linked.
+/// Returns the ELF file of a linked program.
 #[must_use]
 pub fn elf(program: &str) -> PathBuf {
     programs().join(program)
 }
 
-/// The folder that the programs are built in.
+/// Returns the folder in which the programs are built.
 #[must_use]
 pub fn target_dir() -> PathBuf {
     directory().join("target")
@@ -124,10 +125,10 @@ fn cargo_build(arguments: &[&str]) -> Result<Linked, Missing> {
     build_in(&directory(), &target_dir(), &arguments)
 }
 
-/// Builds a package for the robot's processor in release.
+/// Builds a package for the robot's processor in release mode.
 ///
 /// # Errors
-/// [`Missing`] if there is no compiler for the target.
+/// [`Missing`] if no compiler for the target is installed.
 ///
 /// # Panics
 /// If the script that finds the compiler cannot be run.
@@ -156,19 +157,19 @@ pub fn build_in(
 }
 
 impl Firmware {
-    /// The ELF file of a program.
+    /// Returns the ELF file of a program.
     #[must_use]
     pub fn elf(&self, program: &str) -> PathBuf {
         self.programs.join(program)
     }
 
-    /// Runs a program to its end and returns the lines it logged.
+    /// Runs a program to completion and returns the lines it logged.
     ///
     /// # Errors
-    /// [`Missing`] if there is no QEMU.
+    /// [`Missing`] if QEMU is not installed.
     ///
     /// # Panics
-    /// If the program fails, or does not end.
+    /// If the program fails or does not end in time.
     pub fn run(&self, program: &str) -> Result<Vec<String>, Missing> {
         let mut lines = Vec::new();
         let status = run(&self.elf(program), |line| lines.push(line))?;
@@ -180,11 +181,11 @@ impl Firmware {
     }
 }
 
-/// The names of the wheels' registers of `mps2` and of the STM32F405 in QEMU's traces.
+/// Names of the wheels' registers of `mps2` and of the STM32F405 in QEMU's traces.
 const MPS2_WHEELS: &str = "mps2_fpgaio_write";
 const STM32F4_WHEELS: &str = "GPIOC: unimplemented device write";
 
-/// What a program did to its wheels before and during a fault, as traced by QEMU.
+/// A program's writes to the wheels before and during a fault, as traced by QEMU.
 #[derive(Debug)]
 pub struct Faulted {
     /// Writes to the wheels' registers, one line each.
@@ -193,10 +194,10 @@ pub struct Faulted {
     pub log: String,
 }
 
-/// Runs the program `faults` of `mps2`, which provokes this fault and ends.
+/// Runs the program `faults` of `mps2`, which triggers this fault and exits.
 ///
 /// # Errors
-/// [`Missing`] if there is no QEMU.
+/// [`Missing`] if QEMU is not installed.
 ///
 /// # Panics
 /// If the program does not fail.
@@ -216,11 +217,11 @@ pub fn fault_on_mps2(elf: &Path, fault: &str, trace: &Path) -> Result<Faulted, M
     })
 }
 
-/// Runs the program `faults-stm32f4`, which provokes this fault, until it has written to the wheels'
-/// registers three times: to turn the wheels, and twice to stop them.
+/// Runs the program `faults-stm32f4`, which triggers this fault, until it has written to the
+/// wheels' registers three times: to turn the wheels, and twice to stop them.
 ///
 /// # Errors
-/// [`Missing`] if there is no QEMU.
+/// [`Missing`] if QEMU is not installed.
 ///
 /// # Panics
 /// If QEMU fails.
@@ -243,15 +244,15 @@ pub fn fault_on_stm32f4(elf: &Path, fault: &str, trace: &Path) -> Result<Faulted
     while lines(trace, STM32F4_WHEELS).len() < 3 && Instant::now() < end {
         thread::sleep(Duration::from_millis(10));
     }
-    child.kill().expect("it stands until then");
-    child.wait().expect("it has ended");
+    child.kill().expect("QEMU can be killed");
+    child.wait().expect("QEMU has ended");
     Ok(Faulted {
         wheels: lines(trace, STM32F4_WHEELS),
         log: lines(trace, "").join("\n"),
     })
 }
 
-/// The lines of a file with this start; none if the file does not exist yet.
+/// Returns the lines of a file that begin with `start`; none if the file does not exist yet.
 fn lines(path: &Path, start: &str) -> Vec<String> {
     let text = fs::read_to_string(path).unwrap_or_default();
     // The last line may be incomplete.
@@ -264,7 +265,7 @@ fn lines(path: &Path, start: &str) -> Vec<String> {
 /// its exit status.
 ///
 /// # Errors
-/// [`Missing`] if there is no QEMU; the inner error is one of the file, its log or QEMU.
+/// [`Missing`] if QEMU is not installed; the inner error comes from the file, its log or QEMU.
 pub fn run(elf: &Path, line: impl FnMut(String)) -> Result<io::Result<ExitStatus>, Missing> {
     run_with(QEMU_ARGUMENTS, elf, line)
 }
@@ -284,7 +285,7 @@ fn run_with(
         Ok(mut child) => {
             let result = follow(elf, &mut child, line);
             if result.is_err() {
-                // It may already have ended; then there is nothing to do.
+                // QEMU may already have exited; this is ignored.
                 let _ = child.kill();
                 let _ = child.wait();
             }
@@ -301,7 +302,7 @@ pub(crate) fn no_qemu() -> Missing {
     ))
 }
 
-/// Decodes the log of the running program until it ends.
+/// Decodes the log of the running program until the program exits.
 fn follow(elf: &Path, child: &mut Child, mut line: impl FnMut(String)) -> io::Result<ExitStatus> {
     let table = Table::parse(&fs::read(elf)?).map_err(io::Error::other)?;
     let table = table.ok_or_else(|| io::Error::other("the program holds no log formats"))?;
@@ -317,7 +318,7 @@ fn follow(elf: &Path, child: &mut Child, mut line: impl FnMut(String)) -> io::Re
         }
     });
     let end = Instant::now() + TIMEOUT;
-    let overdue = || io::Error::new(io::ErrorKind::TimedOut, "it did not end in time");
+    let overdue = || io::Error::new(io::ErrorKind::TimedOut, "the program did not end in time");
     loop {
         match chunks.recv_timeout(end.saturating_duration_since(Instant::now())) {
             Ok(chunk) => decoder.received(&chunk),

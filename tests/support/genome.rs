@@ -1,11 +1,11 @@
-//! Genomes to write to robots.
+//! Genomes to be written to robots.
 
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, CRC_32C, Provenance, encode};
 use minimal_surprise_controller::{Genome, KERNEL_ID, Topology};
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
 
-/// The container of a genome with random weights.
+/// Returns the container of a genome with random weights.
 ///
 /// # Panics
 /// Never: the buffer holds any container.
@@ -19,7 +19,7 @@ pub fn random(seed: u64, topology: Topology) -> Vec<u8> {
         .to_vec()
 }
 
-/// The same container, but as if it had evolved under another arithmetic.
+/// Returns the container changed to name a different kernel.
 ///
 /// # Panics
 /// If the bytes are not a container.

@@ -1,4 +1,4 @@
-//! Reading recorded traces.
+//! Reads recorded traces.
 
 use minimal_surprise_controller::{
     Action, Decision, Genome, Prediction, SensorBits, SensorModel, Template, Topology, Turn,
@@ -27,7 +27,7 @@ struct Header {
     prediction_output: Vec<i16>,
 }
 
-/// One recorded step, as in the file.
+/// One recorded step as stored in the file.
 #[derive(Deserialize)]
 struct StepLine {
     t: u32,
@@ -52,9 +52,9 @@ struct Footer {
 pub struct Step {
     /// Poses before the step.
     pub poses: Vec<Pose>,
-    /// What the robots sensed.
+    /// The robots' readings.
     pub readings: Vec<SensorBits>,
-    /// What they decided and predicted.
+    /// The robots' decisions and predictions.
     pub decisions: Vec<Decision>,
 }
 
@@ -70,7 +70,7 @@ pub struct Recording {
     pub steps: u32,
     /// Starting poses.
     pub start: Vec<Pose>,
-    /// The steps; empty in the long files.
+    /// The steps; empty for the long files.
     pub trace: Vec<Step>,
     /// Recorded fitness.
     pub fitness: f64,
@@ -80,7 +80,7 @@ pub struct Recording {
     pub final_poses: Vec<Pose>,
 }
 
-/// The folder of the recordings: `GOLDEN_DIR`, or the project's own copy.
+/// Returns the folder of the recordings: `GOLDEN_DIR`, or the project's own copy.
 #[must_use]
 pub fn directory() -> PathBuf {
     std::env::var_os("GOLDEN_DIR").map_or_else(

@@ -1,9 +1,9 @@
-//! A noisy run of the first version, whose hash of the steps covers bits without a sensor.
+//! A noisy run of the first version, whose steps hash covers bits without a sensor.
 
 use std::fs;
 use std::path::Path;
 
-/// Copies its directory.
+/// Copies the run's directory.
 pub fn copy_noisy_run(to: &Path) {
     let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/noisy-run-v1");
     fs::create_dir_all(to).unwrap();

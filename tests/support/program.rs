@@ -10,19 +10,19 @@ use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// How the program was built.
+/// Build profile of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Profile {
-    /// With debug assertions and overflow checks.
+    /// Debug assertions and overflow checks.
     Debug,
-    /// Optimised.
+    /// Optimised code.
     Release,
 }
 
 /// Builds the program, once per process, and returns its path.
 ///
 /// # Panics
-/// If it does not build.
+/// If the program does not compile.
 #[must_use]
 pub fn path(profile: Profile) -> PathBuf {
     static DEBUG: OnceLock<PathBuf> = OnceLock::new();
@@ -49,21 +49,21 @@ pub fn path(profile: Profile) -> PathBuf {
     built.get_or_init(build).clone()
 }
 
-/// The program, in an empty folder that is removed on drop.
+/// The program in an empty folder that is removed on drop.
 #[derive(Debug)]
 pub struct Evolver {
     folder: TempDir,
     program: PathBuf,
 }
 
-/// A process that has ended.
+/// A process that has exited.
 #[derive(Debug)]
 pub struct Finished {
-    /// Its exit code; none after a signal.
+    /// Exit code; `None` after a signal.
     pub code: Option<i32>,
-    /// Its standard output.
+    /// Standard output.
     pub stdout: String,
-    /// Its standard error.
+    /// Standard error.
     pub stderr: String,
 }
 
@@ -71,7 +71,7 @@ impl Finished {
     /// Checks that the program failed, and that the message contains all these words.
     ///
     /// # Panics
-    /// If it ended otherwise.
+    /// If the process exited otherwise.
     pub fn assert_failed(&self, words: &[&str]) {
         assert_eq!(self.code, Some(1), "{self:?}");
         for word in words {
@@ -88,13 +88,13 @@ pub struct Running {
 }
 
 impl Evolver {
-    /// The release program, in an empty folder.
+    /// Returns the release program in an empty folder.
     #[must_use]
     pub fn in_empty_folder() -> Self {
         Self::built(Profile::Release)
     }
 
-    /// The program built this way, in an empty folder.
+    /// Returns the program with this build profile in an empty folder.
     ///
     /// # Panics
     /// If no temporary folder can be created.
@@ -106,13 +106,13 @@ impl Evolver {
         }
     }
 
-    /// The program itself.
+    /// Returns the path of the program.
     #[must_use]
     pub fn program(&self) -> &Path {
         &self.program
     }
 
-    /// The folder.
+    /// Returns the folder.
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.folder.path()
@@ -133,7 +133,7 @@ impl Evolver {
         command
     }
 
-    /// [`Evolver::run`] with an environment variable set.
+    /// Like [`Evolver::run`], with an environment variable set.
     ///
     /// # Panics
     /// If `evolver` cannot be started.
@@ -143,10 +143,10 @@ impl Evolver {
         finish(&mut command)
     }
 
-    /// Runs the program to its end.
+    /// Runs the program to completion.
     ///
     /// # Panics
-    /// If it cannot be started.
+    /// If the program cannot be started.
     pub fn run(&self, arguments: &[impl AsRef<OsStr>]) -> Finished {
         finish(&mut self.command(arguments))
     }
@@ -154,10 +154,10 @@ impl Evolver {
     /// Starts the program.
     ///
     /// # Panics
-    /// If it cannot be started.
+    /// If the program cannot be started.
     #[must_use]
     pub fn start(&self, arguments: &[impl AsRef<OsStr>]) -> Running {
-        // Signals end the program, even if the tests themselves ignore them, as background jobs do.
+        // Signals end the program even if the tests ignore them, as background jobs do.
         let mut command = Command::new("env");
         if cfg!(target_os = "linux") {
             command.arg("--default-signal=INT,TERM,HUP");
@@ -180,7 +180,7 @@ impl Evolver {
     /// Runs a shell command in the folder.
     ///
     /// # Panics
-    /// If there is no shell.
+    /// If the shell cannot be started.
     #[must_use]
     pub fn shell(&self, line: &str) -> Child {
         let mut shell = Command::new("sh");
@@ -191,10 +191,10 @@ impl Evolver {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
-        shell.spawn().expect("a shell")
+        shell.spawn().expect("the shell starts")
     }
 
-    /// All files below the folder, in order.
+    /// Lists all files below the folder, in order.
     #[must_use]
     pub fn files(&self) -> Vec<String> {
         let mut found = Vec::new();
@@ -216,7 +216,7 @@ impl Evolver {
     /// Writes a file in the folder.
     ///
     /// # Panics
-    /// If it cannot be written.
+    /// If the file cannot be written.
     pub fn write(&self, name: &str, contents: &[u8]) {
         fs::write(self.folder().join(name), contents).unwrap_or_else(|e| panic!("{name}: {e}"));
     }
@@ -224,7 +224,7 @@ impl Evolver {
     /// Reads a file in the folder.
     ///
     /// # Panics
-    /// If it cannot be read.
+    /// If the file cannot be read.
     #[must_use]
     pub fn read(&self, name: &str) -> Vec<u8> {
         fs::read(self.folder().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
@@ -247,7 +247,7 @@ fn finish(command: &mut Command) -> Finished {
 }
 
 impl Running {
-    /// Waits until it has written `count` lines to standard error, or has ended.
+    /// Waits until the process has written `count` lines to standard error, or has exited.
     pub fn wait_for_lines(&self, count: usize) {
         for _ in 0..count {
             if self.lines.recv_timeout(Duration::from_secs(120)).is_err() {
@@ -256,33 +256,33 @@ impl Running {
         }
     }
 
-    /// Kills it at once if it has not ended; returns whether it had already ended successfully.
+    /// Kills the process immediately; returns true if it had already exited successfully.
     ///
     /// # Panics
-    /// If the operating system loses track of it.
+    /// If the operating system cannot report the state of the process.
     pub fn kill(mut self) -> bool {
-        let ended = self.child.try_wait().expect("it is our child");
+        let ended = self.child.try_wait().expect("a child process");
         let _ = self.child.kill();
-        let status = self.child.wait().expect("it is our child");
+        let status = self.child.wait().expect("a child process");
         ended.is_some() && status.success()
     }
 
-    /// Sends it Ctrl-C and waits for its end.
+    /// Sends Ctrl-C to the process and waits for it to exit.
     ///
     /// # Panics
-    /// If it does not end in time.
+    /// If the process does not exit in time.
     #[must_use]
     pub fn interrupt(self, patience: Duration) -> Finished {
         self.signal("INT");
         self.ended(patience)
     }
 
-    /// Sends it a signal.
+    /// Sends a signal to the process.
     ///
     /// # Panics
-    /// If it has ended.
+    /// If the process has exited.
     pub fn signal(&self, signal: &str) {
-        // Uses the shell's builtin: a minimal system lacks the program `kill`.
+        // Uses the shell's builtin, because a minimal system lacks the program `kill`.
         let command = format!("kill -{signal} {}", self.child.id());
         let sent = Command::new("sh").args(["-c", &command]).status();
         assert!(sent.is_ok_and(|status| status.success()), "{command}");
@@ -291,18 +291,18 @@ impl Running {
     /// Waits for the process to exit.
     ///
     /// # Panics
-    /// If it does not end in time.
+    /// If the process does not exit in time.
     #[must_use]
     pub fn ended(mut self, patience: Duration) -> Finished {
         let started = Instant::now();
         let status = loop {
-            if let Some(status) = self.child.try_wait().expect("it is our child") {
+            if let Some(status) = self.child.try_wait().expect("a child process") {
                 break status;
             }
             if started.elapsed() > patience {
                 let _ = self.child.kill();
                 let said = self.lines.iter().collect::<Vec<_>>();
-                panic!("it goes on after {patience:?}; it said {said:?}");
+                panic!("still running after {patience:?}; standard error: {said:?}");
             }
             std::thread::sleep(Duration::from_millis(5));
         };

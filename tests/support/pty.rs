@@ -1,4 +1,4 @@
-//! Devices behind a simulated serial port: a pseudo-terminal with a thread at its other end.
+//! Devices on a simulated serial port: a pseudo-terminal with a thread at the other end.
 
 use crate::link_robot::{Flash, LinkRobot};
 use minimal_surprise_link::Server;
@@ -15,24 +15,24 @@ use std::time::{Duration, Instant};
 /// A device on a serial port. Dropping it unplugs it.
 #[derive(Debug)]
 pub struct Device {
-    /// The name of its port.
+    /// Name of the port.
     pub port: String,
-    /// The port, held open: otherwise the other end would read errors.
+    /// The port, held open: otherwise, reads at the other end would fail.
     held: Option<File>,
     unplugged: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// The answer to bytes that have arrived.
+/// Reply to received bytes.
 pub enum Answer {
-    /// These bytes.
+    /// The bytes of the reply.
     Bytes(Vec<u8>),
-    /// The line is unplugged.
+    /// Unplugs the line instead of replying.
     Unplugged,
 }
 
 impl Device {
-    /// Plugs in a device that answers what arrives.
+    /// Plugs in a device that replies to received bytes.
     ///
     /// # Panics
     /// If no pseudo-terminal can be created.
@@ -57,7 +57,7 @@ impl Device {
         })
     }
 
-    /// Plugs in a device behind a board that restarts: after the first byte arrives, it receives
+    /// Plugs in a device on a board that restarts: after the first byte arrives, the board receives
     /// nothing for `silence` and sends `noise` repeatedly.
     ///
     /// # Panics
@@ -78,7 +78,7 @@ impl Device {
         })
     }
 
-    /// Plugs in a device that sends the same bytes repeatedly, whether or not anyone listens.
+    /// Plugs in a device that sends the same bytes repeatedly, whether or not they are read.
     ///
     /// # Panics
     /// If no pseudo-terminal can be created.
@@ -86,7 +86,7 @@ impl Device {
     pub fn talking(bytes: &'static [u8]) -> Self {
         Self::with_thread(move |mut master, unplugged| {
             while !unplugged.load(Ordering::Relaxed) {
-                // Bytes that nobody reads are lost.
+                // Bytes that are not read are lost.
                 let _ = master.write(bytes);
                 thread::sleep(Duration::from_millis(5));
             }
@@ -94,8 +94,8 @@ impl Device {
     }
 
     fn with_thread(run: impl FnOnce(PtyMaster, &AtomicBool) + Send + 'static) -> Self {
-        // Processes started by other tests must not inherit the ends of the line, and a thread
-        // waiting for bytes must not be waited for.
+        // Processes started by other tests must not inherit the ends of the line. Reads must not
+        // block, so that the thread can end.
         let flags = OFlag::O_RDWR | OFlag::O_NOCTTY | OFlag::O_CLOEXEC | OFlag::O_NONBLOCK;
         let master = posix_openpt(flags).expect("a pseudo-terminal");
         let port = name(&master);
@@ -119,8 +119,8 @@ impl Device {
 }
 
 fn name(master: &PtyMaster) -> String {
-    grantpt(master).expect("it is ours");
-    unlockpt(master).expect("it is ours");
+    grantpt(master).expect("this process owns it");
+    unlockpt(master).expect("this process owns it");
     ptsname_r(master).expect("it has a name")
 }
 
@@ -129,7 +129,7 @@ impl Drop for Device {
         self.unplugged.store(true, Ordering::Relaxed);
         self.held = None;
         if let Some(thread) = self.thread.take() {
-            // Its panic message has been printed.
+            // If the thread has panicked, it has printed its message.
             let _ = thread.join();
         }
     }
@@ -139,7 +139,7 @@ impl Drop for Device {
 #[derive(Debug)]
 pub struct PluggedRobot {
     robot: Arc<Mutex<LinkRobot>>,
-    /// Its line.
+    /// Device on the serial port.
     pub device: Device,
 }
 
@@ -148,11 +148,11 @@ pub struct PluggedRobot {
 pub enum Fault {
     /// No fault.
     None,
-    /// It is unplugged when the robot has carried out this many requests.
+    /// The line is unplugged when the robot has executed this many requests.
     PulledAfter(u64),
-    /// From then on, the robot's answers are lost.
+    /// After this many requests, the robot's replies are lost.
     MuteAfter(u64),
-    /// From then on, each answer takes 0.3 s.
+    /// After this many requests, each reply takes 0.3 s.
     SlowAfter(u64),
 }
 
@@ -163,7 +163,7 @@ impl PluggedRobot {
         Self::restarting(flash, fault, Duration::ZERO, b"")
     }
 
-    /// Like [`Self::start`], with a board that restarts at the first byte: for `silence` it sends
+    /// Like [`Self::start`], with a board that restarts at the first byte: for `silence`, it sends
     /// `noise` and receives nothing.
     #[must_use]
     pub fn restarting(flash: Flash, fault: Fault, silence: Duration, noise: &'static [u8]) -> Self {
@@ -189,12 +189,12 @@ impl PluggedRobot {
         Self { robot, device }
     }
 
-    /// The robot.
+    /// Returns the robot, locked for this thread.
     pub fn robot(&self) -> MutexGuard<'_, LinkRobot> {
         lock(&self.robot)
     }
 
-    /// Unplugs the robot, switches it off and returns its flash.
+    /// Unplugs the robot, switches it off and returns the flash.
     ///
     /// # Panics
     /// If the robot has panicked.

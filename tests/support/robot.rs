@@ -1,4 +1,4 @@
-//! The robot under QEMU, on a serial port.
+//! The robot under QEMU, with a serial port.
 
 use crate::firmware::{Firmware, QEMU, no_qemu};
 use crate::tools::Missing;
@@ -11,7 +11,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// As in `firmware-example/src/bin/robot.rs`. Time is wall-clock time.
+/// The same arguments as in `firmware-example/src/bin/robot.rs`. Time is wall-clock time.
 const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 -nographic -monitor none \
     -serial pty -semihosting-config enable=on,target=native -kernel";
 
@@ -19,15 +19,15 @@ const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 -nographic -mon
 #[derive(Debug)]
 pub struct QemuRobot {
     child: Child,
-    /// Its serial port.
+    /// The robot's serial port.
     pub port: String,
     /// The port, held open: QEMU checks only once per second whether a closed port is open again.
     _open: File,
 }
 
 impl QemuRobot {
-    /// Starts the robot. Its flash is `flash.bin` in `folder`, created if missing; its log is
-    /// dropped.
+    /// Starts the robot. The flash is `flash.bin` in `folder`, created if missing; the log is
+    /// discarded.
     ///
     /// # Errors
     /// [`Missing`] if QEMU is not installed.
@@ -58,20 +58,20 @@ impl QemuRobot {
             .find(|word| word.starts_with("/dev"));
         let port = port.unwrap_or_else(|| panic!("no serial port in {line:?}"));
         let port = port.to_owned();
-        // A full pipe would stop the robot at its next log line.
+        // A full pipe would block the robot at the next log line.
         thread::spawn(move || io::copy(&mut output, &mut io::sink()));
         let open = OpenOptions::new().read(true).write(true).open(&port);
         Ok(Self {
             child,
-            _open: open.expect("QEMU has just made it"),
+            _open: open.expect("QEMU has just created the port"),
             port,
         })
     }
 
-    /// Cuts its power: SIGKILL.
+    /// Cuts the robot's power: SIGKILL.
     ///
     /// # Panics
-    /// If it cannot be killed.
+    /// If QEMU cannot be killed.
     pub fn kill(mut self) {
         self.child.kill().expect("QEMU can be killed");
         self.child.wait().expect("QEMU has ended");
@@ -80,24 +80,24 @@ impl QemuRobot {
 
 impl Drop for QemuRobot {
     fn drop(&mut self) {
-        // It may already have ended; then there is nothing to do.
+        // QEMU may already have exited; this is ignored.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// The host's end of a robot's line.
+/// The host's end of a serial line to a robot.
 pub struct Line {
     port: Box<dyn SerialPort>,
     client: Client,
 }
 
-/// Why there is no answer.
+/// Error: the robot did not reply.
 #[derive(Debug)]
 pub enum LineError {
-    /// The port reports an error: the robot is off.
+    /// The port reports an error because the robot is off.
     Port(io::Error),
-    /// The robot does not answer.
+    /// The robot does not reply.
     GaveUp(GaveUp),
 }
 
@@ -108,10 +108,10 @@ impl From<io::Error> for LineError {
 }
 
 impl Line {
-    /// Opens a port, and a session with this number.
+    /// Opens a port and starts a session with this number.
     ///
     /// # Errors
-    /// If there is no such port.
+    /// If the port does not exist.
     pub fn open(port: &str, session: u32) -> io::Result<Self> {
         let port = serialport::new(port, 115_200)
             .timeout(Duration::from_millis(10))
@@ -122,10 +122,10 @@ impl Line {
         })
     }
 
-    /// Sends a request and passes the answer on.
+    /// Sends a request and passes the reply to `answer`.
     ///
     /// # Errors
-    /// [`LineError`].
+    /// [`LineError`] if the port reports an error or the robot does not reply.
     ///
     /// # Panics
     /// If the request cannot be sent.

@@ -1,4 +1,4 @@
-//! Reading recorded structure counts.
+//! Reads recorded structure counts.
 
 use minimal_surprise_sim::structures::{Structure, Structures};
 use minimal_surprise_sim::{Grid, Pose};
@@ -43,34 +43,34 @@ struct ClusterLine {
 /// All counts of a state.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Counts {
-    /// Robots in lines.
+    /// Number of robots in lines.
     pub line_robots: u64,
-    /// Lines from west to east.
+    /// Number of lines from west to east.
     pub horizontal: u64,
-    /// Lines from south to north.
+    /// Number of lines from south to north.
     pub vertical: u64,
-    /// Lines around the torus.
+    /// Number of lines around the torus.
     pub spanning: u64,
-    /// Robots in pairs.
+    /// Number of robots in pairs.
     pub pair: u64,
-    /// Robots in squares.
+    /// Number of robots in squares.
     pub square: u64,
-    /// Robots in triangular lattices.
+    /// Number of robots in triangular lattices.
     pub triangular_lattice: u64,
-    /// Robots randomly dispersed.
+    /// Number of robots in random dispersion.
     pub random_dispersion: u64,
-    /// Robots in clusters.
+    /// Number of robots in clusters.
     pub cluster_robots: u64,
-    /// Clusters.
+    /// Number of clusters.
     pub clusters: u64,
-    /// Connected pairs of clusters.
+    /// Number of connected pairs of clusters.
     pub connections: u64,
-    /// The grouping that the clusters form; clustering if there are none.
+    /// The grouping formed by the clusters; clustering if there are no clusters.
     pub verdict: Structure,
 }
 
 impl Counts {
-    /// The counts that the library gives.
+    /// Returns the library's counts.
     #[must_use]
     pub fn of(structures: &Structures) -> Self {
         let count = |structure| u64::from(structures.count(structure));
@@ -93,7 +93,7 @@ impl Counts {
         }
     }
 
-    /// Every count and the verdict, in one order, by name.
+    /// Returns every count and the verdict, in a fixed order, with names.
     #[must_use]
     pub fn named(&self) -> [(&'static str, u64); 12] {
         [
@@ -115,19 +115,19 @@ impl Counts {
 
 /// A recorded state.
 pub struct State {
-    /// Line of the file, from 1.
+    /// Line number in the file, from 1.
     pub line: usize,
-    /// Where the state comes from.
+    /// Source of the state.
     pub source: String,
     /// The grid.
     pub grid: Grid,
     /// The swarm.
     pub poses: Vec<Pose>,
-    /// What the authors' scripts counted.
+    /// Counts of the authors' scripts.
     pub recorded: Counts,
 }
 
-/// The file of the states: `STRUCTURES_FILE`, or the project's own copy.
+/// Returns the file of the states: `STRUCTURES_FILE`, or the project's own copy.
 #[must_use]
 pub fn file() -> PathBuf {
     std::env::var_os("STRUCTURES_FILE").map_or_else(
@@ -136,7 +136,7 @@ pub fn file() -> PathBuf {
     )
 }
 
-/// All states, in the order of the file.
+/// Reads all states, in the order of the file.
 ///
 /// # Panics
 /// If the file cannot be read.

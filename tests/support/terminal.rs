@@ -1,4 +1,4 @@
-//! A program in a pseudo-terminal that receives keys and whose screen is read.
+//! A program in a pseudo-terminal, which receives keys and whose screen is read.
 
 use crate::program::Evolver;
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
@@ -8,7 +8,7 @@ use std::process::Command;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Maximum time to wait for the screen to show something.
+/// Maximum wait for the screen to show something.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A program that runs in a terminal. It is killed on drop.
@@ -18,7 +18,7 @@ pub struct Terminal {
     keys: Box<dyn Write + Send>,
     output: Receiver<Vec<u8>>,
     parser: vt100::Parser,
-    /// Everything that it has sent.
+    /// Everything that the program has sent.
     sent: Vec<u8>,
     line_settings: u32,
 }
@@ -46,7 +46,7 @@ impl Terminal {
     /// UTF-8.
     ///
     /// # Panics
-    /// If it cannot be started.
+    /// If the program cannot be started.
     #[must_use]
     pub fn start(
         evolver: &Evolver,
@@ -61,7 +61,7 @@ impl Terminal {
     /// Like [`Self::start`], with environment variables; a variable without a value is unset.
     ///
     /// # Panics
-    /// If it cannot be started.
+    /// If the program cannot be started.
     #[must_use]
     pub fn start_with<'a>(
         evolver: &Evolver,
@@ -122,7 +122,7 @@ impl Terminal {
     /// Types keys.
     ///
     /// # Panics
-    /// If the terminal is gone.
+    /// If the terminal is closed.
     pub fn types(&mut self, keys: &str) {
         self.keys.write_all(keys.as_bytes()).expect("it listens");
         self.keys.flush().expect("it listens");
@@ -131,19 +131,19 @@ impl Terminal {
     /// Resizes the window.
     ///
     /// # Panics
-    /// If the terminal is gone.
+    /// If the terminal is closed.
     pub fn resize(&mut self, rows: u16, columns: u16) {
         self.parser.screen_mut().set_size(some(rows), some(columns));
         self.master.resize(size(rows, columns)).expect("it is open");
     }
 
-    /// The current screen.
+    /// Returns the current screen.
     #[must_use]
     pub fn screen(&self) -> &vt100::Screen {
         self.parser.screen()
     }
 
-    /// Rows of the screen, without spaces at their ends.
+    /// Returns the rows of the screen, without trailing spaces.
     #[must_use]
     pub fn rows(&self) -> Vec<String> {
         let (_, columns) = self.screen().size();
@@ -154,15 +154,15 @@ impl Terminal {
     /// Waits until the screen shows these words.
     ///
     /// # Panics
-    /// If that does not happen in time.
+    /// If the words do not appear in time.
     pub fn wait_for(&mut self, words: &str) {
         self.wait_until(words, true);
     }
 
-    /// Waits until the screen does not show these words any more.
+    /// Waits until the screen no longer shows these words.
     ///
     /// # Panics
-    /// If that does not happen in time.
+    /// If the words do not disappear in time.
     pub fn wait_while(&mut self, words: &str) {
         self.wait_until(words, false);
     }
@@ -170,7 +170,7 @@ impl Terminal {
     /// Waits until the condition holds for the screen, whose contents arrive in pieces.
     ///
     /// # Panics
-    /// If that does not happen in time.
+    /// If the condition does not become true in time.
     pub fn wait_until_it_shows(&mut self, what: &str, holds: impl Fn(&Self) -> bool) {
         let started = Instant::now();
         while !holds(self) {
@@ -187,7 +187,7 @@ impl Terminal {
         self.sent.extend_from_slice(bytes);
     }
 
-    /// Everything that the program has sent, including escape codes.
+    /// Returns everything that the program has sent, including escape codes.
     #[must_use]
     pub fn sent(&self) -> String {
         String::from_utf8_lossy(&self.sent).into_owned()
@@ -208,10 +208,10 @@ impl Terminal {
         }
     }
 
-    /// Types, and waits until the screen shows these words.
+    /// Types keys, and waits until the screen shows these words.
     ///
     /// # Panics
-    /// If that does not happen in time.
+    /// If the words do not appear in time.
     pub fn after(&mut self, keys: &str, words: &str) {
         self.types(keys);
         self.wait_for(words);
@@ -220,26 +220,26 @@ impl Terminal {
     /// Sends the program a signal.
     ///
     /// # Panics
-    /// If it has ended.
+    /// If the program has exited.
     pub fn signal(&self, signal: &str) {
-        let id = self.child.process_id().expect("it has not ended");
+        let id = self.child.process_id().expect("the program is running");
         let sent = Command::new("sh")
             .args(["-c", &format!("kill -{signal} {id}")])
             .status();
         assert!(sent.is_ok_and(|status| status.success()), "kill {id}");
     }
 
-    /// Waits for the end of the program; returns its exit code.
+    /// Waits for the program to exit; returns its exit code.
     ///
     /// # Panics
-    /// If it does not end in time.
+    /// If the program does not exit in time.
     pub fn ended(&mut self) -> u32 {
         let started = Instant::now();
         let status = loop {
-            if let Some(status) = self.child.try_wait().expect("it is our child") {
+            if let Some(status) = self.child.try_wait().expect("a child process") {
                 break status;
             }
-            assert!(started.elapsed() < PATIENCE, "it goes on");
+            assert!(started.elapsed() < PATIENCE, "the program is still running");
             match self.output.recv_timeout(Duration::from_millis(20)) {
                 Ok(bytes) => self.takes(&bytes),
                 Err(RecvTimeoutError::Timeout) => {}
@@ -248,14 +248,14 @@ impl Terminal {
                 }
             }
         };
-        // Its last output may still be on its way.
+        // The last output may not have been read yet.
         while let Ok(bytes) = self.output.recv_timeout(Duration::from_millis(500)) {
             self.takes(&bytes);
         }
         status.exit_code()
     }
 
-    /// Returns whether the screen, the cursor and the line settings are as a shell needs them.
+    /// Checks whether the screen, the cursor and the line settings are restored for a shell.
     #[must_use]
     pub fn is_restored(&self) -> bool {
         let screen = self.screen();
@@ -265,11 +265,11 @@ impl Terminal {
     }
 }
 
-/// Runs a shell command in a terminal, closes the terminal once `when` holds, and waits for the end
-/// of the shell.
+/// Runs a shell command in a terminal, closes the terminal once `when` returns true, and waits for
+/// the shell to exit.
 ///
 /// # Panics
-/// If it does not start or end in time.
+/// If the shell does not start or exit in time.
 pub fn close_terminal_of(evolver: &Evolver, line: &str, when: impl Fn() -> bool) {
     let pair = native_pty_system()
         .openpty(size(24, 80))
@@ -277,7 +277,7 @@ pub fn close_terminal_of(evolver: &Evolver, line: &str, when: impl Fn() -> bool)
     let mut command = CommandBuilder::new("sh");
     command.args(["-c", line]);
     command.cwd(evolver.folder());
-    let mut shell = pair.slave.spawn_command(command).expect("it starts");
+    let mut shell = pair.slave.spawn_command(command).expect("the shell starts");
     drop(pair.slave);
     let started = Instant::now();
     let wait = || {
@@ -288,14 +288,14 @@ pub fn close_terminal_of(evolver: &Evolver, line: &str, when: impl Fn() -> bool)
         wait();
     }
     drop(pair.master);
-    while shell.try_wait().expect("it is our child").is_none() {
+    while shell.try_wait().expect("a child process").is_none() {
         wait();
     }
 }
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        // It may already have ended; the end of this process cleans up.
+        // The program may already have exited; its process is removed when this process exits.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

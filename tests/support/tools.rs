@@ -1,8 +1,8 @@
-//! Tools that a test needs and a machine may lack.
+//! Tools that a test needs and that may be missing on a machine.
 
 use std::fmt;
 
-/// A tool is missing; holds what to install.
+/// Error: a tool is missing; describes what to install.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Missing(pub String);
 
@@ -15,8 +15,8 @@ impl fmt::Display for Missing {
 /// Returns the tool, or prints that the test is skipped and returns `None`.
 ///
 /// # Panics
-/// If the tool is missing and the environment has `CI=true`: there, a skipped test would pass
-/// unseen.
+/// If the tool is missing and the environment has `CI=true`: there, a skipped test would go
+/// unnoticed.
 #[must_use]
 pub fn require<T>(tool: Result<T, Missing>) -> Option<T> {
     match tool {
