@@ -45,6 +45,12 @@ impl Source {
             Self::Table(number) => format!("table-{number}"),
         }
     }
+
+    /// Formats the source of a table; empty if the paper has no such numbers.
+    #[must_use]
+    pub fn in_words(source: Option<&Self>) -> String {
+        source.map(Self::to_string).unwrap_or_default()
+    }
 }
 
 impl fmt::Display for Source {
