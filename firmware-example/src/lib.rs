@@ -14,7 +14,7 @@ pub mod robot;
 pub mod stm32f4;
 
 #[cfg(all(target_arch = "arm", feature = "qemu"))]
-pub mod board;
+pub mod emulator;
 #[cfg(target_arch = "arm")]
 pub mod faults;
 #[cfg(all(target_arch = "arm", feature = "qemu"))]

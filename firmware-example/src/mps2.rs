@@ -6,7 +6,7 @@
 //! Uses `unsafe` because device registers and the arguments of semihosting are addresses.
 #![allow(unsafe_code)]
 
-use crate::board::WHEELS;
+use crate::emulator::WHEELS;
 use crate::faults::guard_stack;
 use crate::robot::{Board, Motion, NEIGHBOURS_MAX};
 use core::ptr;

@@ -15,7 +15,7 @@ use cortex_m::Peripherals;
 use cortex_m::peripheral::SYST;
 use cortex_m_rt::entry;
 use defmt::println;
-use firmware_example::board;
+use firmware_example::emulator;
 use firmware_example::instructions::{Counter, RELOAD};
 use firmware_example::memory_flash::MemoryFlash;
 use firmware_example::parity::{MUTATIONS, SEED, draw_genome, draw_sensors};
@@ -129,7 +129,7 @@ fn main() -> ! {
     );
     let known = stack::depth(&mut || known_depth());
     assert!((KNOWN_BYTES..KNOWN_BYTES + 100).contains(&(known as usize)));
-    board::succeed()
+    emulator::succeed()
 }
 
 /// Computes the activations of a layer.

@@ -9,7 +9,7 @@ use core::hint::black_box;
 use cortex_m::Peripherals;
 use cortex_m_rt::entry;
 use defmt::println;
-use firmware_example::board;
+use firmware_example::emulator;
 use firmware_example::instructions::Counter;
 use firmware_example::parity::{MUTATIONS, SEED, draw_genome, draw_sensors};
 use minimal_surprise_controller::{Controller, Decision, SensorBits, State, Topology, activate};
@@ -59,7 +59,7 @@ fn main() -> ! {
         "one control step: {=u32} instructions at most, of {=u32} steps",
         most, steps
     );
-    board::succeed()
+    emulator::succeed()
 }
 
 /// Computes the activations of a layer, in a separate function so that its instructions can be

@@ -6,10 +6,10 @@
 
 use cortex_m_rt::entry;
 use defmt::{Display2Format, println};
-use firmware_example::{board, parity};
+use firmware_example::{emulator, parity};
 
 #[entry]
 fn main() -> ! {
     parity::run(|line| println!("{}", Display2Format(&line)));
-    board::succeed()
+    emulator::succeed()
 }

@@ -14,7 +14,7 @@
 
 use cortex_m::Peripherals;
 use cortex_m_rt::entry;
-use firmware_example::board;
+use firmware_example::emulator;
 use firmware_example::mps2::{FileFlash, Mps2};
 use firmware_example::robot::Robot;
 
@@ -25,14 +25,14 @@ fn main() -> ! {
         Ok(flash) => flash,
         Err(error) => {
             defmt::error!("flash.bin: {}", error);
-            board::fail()
+            emulator::fail()
         }
     };
     match Robot::start(Mps2::new(peripherals.SYST), flash, 0) {
         Ok(mut robot) => robot.run(),
         Err(error) => {
             defmt::error!("{}", defmt::Debug2Format(&error));
-            board::fail()
+            emulator::fail()
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The emulated board: functions that end a program.
+//! The emulator: functions that end a program, and the board's wheels.
 //!
 //! Linking this module also links the logger and the critical section that the logger needs.
 //!
