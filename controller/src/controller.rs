@@ -89,18 +89,6 @@ pub struct Surprise {
     pub seen_bits: u64,
 }
 
-impl Surprise {
-    /// Returns the mispredicted share in Q16: 0 (no bit mispredicted) to 65,536 (all), rounded
-    /// down; 0 before the first step.
-    #[must_use]
-    pub fn share_q16(self) -> u32 {
-        match (self.mispredicted_bits << 16).checked_div(self.seen_bits) {
-            Some(share) => share as u32,
-            None => 0,
-        }
-    }
-}
-
 impl Controller {
     /// Builds the controller of a genome and precomputes everything that is constant.
     #[must_use]
@@ -308,12 +296,10 @@ mod tests {
         let topology = Topology::new(SensorModel::B, Prediction::Predefined(Template::Line));
         let controller = Controller::new(&Genome::zeroed(topology.unwrap()));
         let mut state = State::new(&controller);
-        assert_eq!(state.surprise().share_q16(), 0);
         controller.step(&mut state, SensorBits::new(0b00_1001));
         controller.step(&mut state, SensorBits::new(0b11_0001));
         let surprise = state.surprise();
         assert_eq!((surprise.mispredicted_bits, surprise.seen_bits), (3, 12));
-        assert_eq!(surprise.share_q16(), 65_536 / 4);
     }
 
     #[test]

@@ -393,11 +393,6 @@ impl<F: NorFlash> Slots<F> {
         }
     }
 
-    /// Aborts an update in progress, if any.
-    pub fn abort(&mut self) {
-        self.update = None;
-    }
-
     /// Returns the number of bytes of the container received so far; `None` if no update is in
     /// progress.
     #[must_use]

@@ -295,21 +295,6 @@ impl Measures {
     }
 }
 
-/// Computes the surprise of each robot over time: [`Measures::surprise_of_robots`] for every step
-/// of a trace.
-///
-/// # Panics
-/// If the number of robots changes during the run.
-#[must_use]
-pub fn surprise_over_time(grid: Grid, topology: Topology, trace: &Trace) -> Vec<Vec<f64>> {
-    let starts = trace.steps.first().map_or(&trace.final_poses, |s| &s.poses);
-    let mut rows = Vec::with_capacity(trace.steps.len());
-    Measures::starting_from(grid, topology, starts).replay(trace, |measures| {
-        rows.push(measures.surprise_of_robots());
-    });
-    rows
-}
-
 /// Condition for a robot in one state to match a robot in a different state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Match {
@@ -420,11 +405,12 @@ mod tests {
     fn surprise_is_the_share_of_mispredicted_bits() {
         // At t = 0: one of 8 bits for each robot; at t = 1: none for the first, one for the second.
         let (measures, trace) = facing_pair(Prediction::Free);
-        let over_time = surprise_over_time(
-            parse("·····\n".repeat(5).as_str()).unwrap().0,
-            topology(Prediction::Free),
-            &trace,
-        );
+        let grid = parse("·····\n".repeat(5).as_str()).unwrap().0;
+        let mut over_time = Vec::new();
+        Measures::starting_from(grid, topology(Prediction::Free), &trace.steps[0].poses)
+            .replay(&trace, |measures| {
+                over_time.push(measures.surprise_of_robots())
+            });
         assert_eq!(over_time, [[0.125, 0.125], [0.0, 0.125]]);
         assert_eq!(measures.surprise_of_robots(), [0.0, 0.125]);
         // Swarm: 2/16, then 1/16; 1 − their mean is the fitness 29/32.

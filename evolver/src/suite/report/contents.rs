@@ -20,7 +20,7 @@ const OTHER_FILES: [&str; 4] = ["report", "runs", "findings", "how-made"];
 
 /// Provenance of a setting's runs, evolved or re-evaluated.
 #[derive(Clone, Debug, Serialize)]
-pub struct Provenance {
+pub struct ProvenanceRow {
     /// The experiment.
     pub experiment: String,
     /// The setting.
@@ -44,7 +44,7 @@ pub struct Provenance {
     pub wall_s: f64,
 }
 
-impl Provenance {
+impl ProvenanceRow {
     /// Formats CPU time and elapsed time in minutes.
     pub(super) fn minutes(&self) -> String {
         if self.cpu_s == 0.0 {
@@ -87,7 +87,7 @@ pub struct SuiteReport {
     /// Time spent on all runs, each counted once.
     pub time: TimeSpent,
     /// Provenance of the runs.
-    pub making: Vec<Provenance>,
+    pub making: Vec<ProvenanceRow>,
 }
 
 impl SuiteReport {
@@ -213,7 +213,7 @@ fn differences(tests: &[(&Table, &Value)]) -> Vec<String> {
     words.collect()
 }
 
-fn provenance(group: &Group, called: &str) -> Provenance {
+fn provenance(group: &Group, called: &str) -> ProvenanceRow {
     let programs: BTreeSet<&str> = group
         .runs
         .iter()
@@ -226,7 +226,7 @@ fn provenance(group: &Group, called: &str) -> Provenance {
     }
     let times = group.runs.iter().map(|run| run.finished.time);
     let time = times.fold(TimeSpent::default(), TimeSpent::and);
-    Provenance {
+    ProvenanceRow {
         experiment: group.experiment.clone(),
         setting: group.setting(),
         finished: group.runs.len(),
@@ -256,14 +256,14 @@ fn seeds(runs: &[GatheredRun]) -> String {
 
 /// Returns the provenance of runs that the report itself executes: from new starts and after
 /// damage.
-fn made_again(gathered: &Gathered, called: &str) -> Vec<Provenance> {
+fn made_again(gathered: &Gathered, called: &str) -> Vec<ProvenanceRow> {
     let program = format!(
         "{} {}, revision {}",
         env!("CARGO_PKG_NAME"),
         env!("CARGO_PKG_VERSION"),
         env!("BUILD_REVISION")
     );
-    let again = |experiment: &str, setting, seeds, (finished, planned), hash: &str| Provenance {
+    let again = |experiment: &str, setting, seeds, (finished, planned), hash: &str| ProvenanceRow {
         experiment: experiment.to_owned(),
         setting,
         finished,
