@@ -32,7 +32,7 @@ const ROWS: [(&str, &str); 9] = [
     ),
     (
         "start_stack_bytes",
-        "deepest stack of the start from the slots, bytes",
+        "deepest stack while starting from the slots, bytes",
     ),
 ];
 
@@ -69,7 +69,7 @@ fn budget() -> Vec<u32> {
 fn readme() -> (Vec<Row>, String) {
     let text = text("../README.md");
     let (_, cost) = text.split_once("### Cost").expect("a section on costs");
-    let (cost, _) = cost.split_once("\n## ").expect("a section behind it");
+    let (cost, _) = cost.split_once("\n## ").expect("a section after it");
     let rows = cost.lines().filter_map(|line| {
         let mut cells = line.trim_matches('|').split(" | ").map(str::trim);
         let (what, measured, most) = (cells.next()?, cells.next()?, cells.next()?);

@@ -57,12 +57,14 @@ fn crc_of(container: &[u8]) -> String {
     format!("crc: {}", u32::from_le_bytes(*crc))
 }
 
-/// Asserts a single message with all these words, and the exit code for bad input.
+/// Asserts that the run printed a single message containing all these words and exited with the
+/// code for bad input.
 fn assert_refused(run: &Finished, words: &[&str]) {
     assert_error(run, 2, words);
 }
 
-/// Asserts a single message with all these words, and the exit code for failures.
+/// Asserts that the run printed a single message containing all these words and exited with the
+/// code for failures.
 fn assert_failed(run: &Finished, words: &[&str]) {
     assert_error(run, 1, words);
 }
@@ -236,11 +238,11 @@ fn bad_flags_are_refused_with_the_flag_the_value_and_the_valid_range() {
         ),
         (
             "hil old.genome --simulate --steps none",
-            "--steps = none: expected a whole number from 1",
+            "--steps = none: expected a whole number from 1 to 4294967295",
         ),
         (
             "monitor --port nowhere --for 0",
-            "--for = 0: expected a whole number from 1",
+            "--for = 0: expected a whole number from 1 to 4294967295",
         ),
         (
             "start --port nowhere --wait never",
@@ -248,7 +250,7 @@ fn bad_flags_are_refused_with_the_flag_the_value_and_the_valid_range() {
         ),
         (
             "flash old.genome --port nowhere --baud fast",
-            "--baud = fast: expected a whole number from 1",
+            "--baud = fast: expected a whole number from 1 to 12000000",
         ),
         (
             "hil . --simulate --seed 1",
@@ -570,7 +572,7 @@ fn a_commit_whose_answer_is_lost_is_detected() {
 
 /// Returns the line that shows how to start a robot on this port.
 fn start_line(port: &str) -> String {
-    format!("the robot may be stopped now; start it with: evolver start --port {port}")
+    format!("the robot may still be stopped; start it with: evolver start --port {port}")
 }
 
 /// Waits until the robot has executed this many requests.

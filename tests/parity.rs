@@ -1,5 +1,5 @@
 //! The controller computes the same bits on an emulated Cortex-M4 as on the host, and stays within
-//! its instruction count there.
+//! its instruction budget on it.
 
 use firmware_example::parity;
 use minimal_surprise_controller::KERNEL_ID;

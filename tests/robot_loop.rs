@@ -25,7 +25,7 @@ type Events = Rc<RefCell<Vec<Event>>>;
 
 #[derive(Debug, Default)]
 struct TestBoard {
-    /// Detector reading of the next period: none, or whether a robot is ahead.
+    /// Detector reading of the next period: true if a robot is ahead; `None` without a reading.
     reading: Option<bool>,
     arriving: VecDeque<u8>,
     period: bool,

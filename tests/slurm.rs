@@ -1,4 +1,5 @@
-//! Suites on a real Slurm with three nodes, which fail, terminate tasks and restart them.
+//! Suites on a real Slurm cluster of three nodes; nodes fail, and tasks are terminated and
+//! restarted.
 //!
 //! Runs only with `TEST_ALL=1`, as root, and if Slurm is installed.
 #![cfg(target_os = "linux")]
@@ -452,7 +453,7 @@ fn a_real_slurm_refuses_too_many_tasks_and_reports_a_failed_one() {
     let submit = "suite own.toml submit --engine slurm --out suite --runs 60 --shards 102";
     let refused = slurm.evolver(&evolver, &submit.split(' ').collect::<Vec<_>>());
     assert_eq!(refused.code, Some(1), "{refused:?}");
-    for words in ["Invalid job array", "--shards = 102", "from 1 to 101"] {
+    for words in ["Invalid job array", "--shards = 102", "accepts 1 to 101"] {
         assert!(refused.stderr.contains(words), "no {words:?}: {refused:?}");
     }
     evolver.write("suite/runs", b"a file where the runs should be");

@@ -182,8 +182,8 @@ impl PlainReading<'_> {
             .collect()
     }
 
-    /// Returns a run without the robots that point outward from its ends; `None` if the scripts'
-    /// rules lose the line.
+    /// Returns a run without the outward-pointing robots at its ends; `None` if the scripts' rules
+    /// lose the line.
     fn dropped(&self, track: Track, first: u16, length: u16) -> Option<(u16, u16)> {
         if length == track.length {
             return Some((first, length));

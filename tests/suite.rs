@@ -288,7 +288,7 @@ fn a_refused_submission_reports_the_clusters_limit_and_leaves_nothing() {
     for words in [
         "Invalid job array specification",
         "--shards = 5",
-        "from 1 to 4",
+        "accepts 1 to 4",
     ] {
         assert!(refused.stderr.contains(words), "no {words:?}: {refused:?}");
     }
@@ -386,7 +386,7 @@ fn plan_and_status_count_the_runs() {
         "600 different runs",
         "predefined, geometry                       20 new starts",
         "densities, triangular lattice               3 areas, 20 times",
-        "if no run of densities has a line: up to 1000 runs more",
+        "if no run of densities has a line: up to 1000 more runs",
         " billion robot-steps",
     ] {
         assert!(paper.stdout.contains(words), "no {words:?}: {paper:?}");

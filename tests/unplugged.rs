@@ -219,7 +219,7 @@ impl Robot {
         }
     }
 
-    /// Writes a genome and returns how long that took.
+    /// Writes a genome and returns the time taken.
     fn update(&self, evolver: &Evolver, container: &[u8]) -> Duration {
         let started = Instant::now();
         let flashed = flash(evolver, &self.qemu.port, container);

@@ -43,10 +43,10 @@ const TAIL: i32 = 4095 << 3;
 /// The coefficients that [`activate`] uses, highest power first. One row per value of `z >> 16`, in
 /// the order 0 … 15 and −16 … −1, so that [`activate`] needs no clamp, bounds check or magnitude.
 ///
-/// If −x has segment s and position t, then x < 0 has segment −1 − s and position −t. (−t does not
-/// fit where t is −½, but only 0 and −32768 have that t, and they do not need −t.) With −t, the row
-/// yields the first result negated, the second unchanged and the third negated; its constants
-/// include the d − 1 of ⌊(d − 1 − a) / d⌋ = −⌊a / d⌋.
+/// For x < 0: if −x has segment s and position t, then x has segment −1 − s and position −t. (−t
+/// does not fit if t is −½, but only 0 and −32768 have that t, and their −t is never used.) With
+/// −t, the row yields the first result negated, the second unchanged and the third negated; its
+/// constants include the d − 1 of ⌊(d − 1 − a) / d⌋ = −⌊a / d⌋.
 pub(crate) static ROWS: [[i32; 4]; 32] = {
     let mut rows = [[0; 4]; 32];
     let mut segment = 0;
@@ -86,7 +86,7 @@ fn mul_high(a: i32, b: i32) -> i32 {
     ((i64::from(a) * i64::from(b)) >> 16) as i32
 }
 
-/// Identifies the arithmetic: a controller rejects genomes evolved with a different kernel.
+/// Identity of the arithmetic: a controller rejects genomes evolved with a different kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct KernelId(pub [u8; 8]);

@@ -69,7 +69,7 @@ struct Header {
     prediction_weights: u16,
 }
 
-/// Error for bytes that are not a genome that this controller can run.
+/// Error: the bytes are not a genome that this controller can run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

@@ -125,9 +125,9 @@ impl Controller {
         controller
     }
 
-    /// Runs one control step: scores the last prediction against `sensors`, chooses an action from
-    /// `sensors` and the last action, and predicts the next reading from `sensors` and the new
-    /// action.
+    /// Runs one control step: scores the previous prediction against `sensors`, chooses an action
+    /// from `sensors` and the previous action, and predicts the next reading from `sensors` and the
+    /// new action.
     ///
     /// Ignores bits beyond the model's sensors. Cannot fail, panic or allocate.
     // Compiled only once, in this crate, so that a firmware can optimise this crate for speed and
@@ -144,7 +144,7 @@ impl Controller {
         }
     }
 
-    /// Runs only the action network: a function of the sensor bits and the last action.
+    /// Runs only the action network: a function of the sensor bits and the previous action.
     #[inline]
     #[must_use]
     pub fn decide(&self, sensors: SensorBits, last_action: Action) -> (Action, Turn) {
@@ -164,8 +164,8 @@ impl Controller {
         (action, turn)
     }
 
-    /// Completes a step after the action is chosen: scores the last prediction and makes the next
-    /// one.
+    /// Completes a step after the action is chosen: scores the previous prediction and makes the
+    /// next one.
     #[inline]
     pub fn predict(&self, state: &mut State, sensors: SensorBits, action: Action) -> SensorBits {
         let sensors = SensorBits::new(sensors.bits() & self.topology.model().mask().bits());
@@ -228,7 +228,7 @@ pub fn spread(bits: u16, mask: u16) -> u16 {
 }
 
 impl State {
-    /// Creates the state of a robot before its first step: hidden values zero, last action
+    /// Creates the state of a robot before its first step: hidden values zero, previous action
     /// straight, and only the fixed predictions.
     #[must_use]
     pub fn new(controller: &Controller) -> Self {
@@ -246,7 +246,7 @@ impl State {
         self.prediction
     }
 
-    /// Returns the action of the last step; straight before the first step.
+    /// Returns the action of the latest step; straight before the first step.
     #[must_use]
     pub fn last_action(&self) -> Action {
         self.last_action

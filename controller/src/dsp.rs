@@ -3,8 +3,8 @@
 //!
 //! This is the only module of the crate that uses `unsafe`. The intrinsic for SMLAD is not stable,
 //! and without it the compiler neither emits the instruction nor combines the loads of the terms: a
-//! control step would exceed the instruction budget of a robot (test `budget`). Sums are exact in
-//! any order, so the results equal those of the portable code bit for bit (test `parity`).
+//! control step would exceed the instruction budget of a robot (`budget` test). Sums are exact in
+//! any order, so the results equal those of the portable code bit for bit (`parity` test).
 #![allow(unsafe_code)]
 
 use crate::activation::{ROWS, SEGMENT_SCALE};

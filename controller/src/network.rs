@@ -102,7 +102,7 @@ impl Shape {
         })
     }
 
-    /// Creates a shape for a constant like [`Shape::new`]; an invalid shape does not compile.
+    /// Creates a shape for use in a constant; an invalid shape does not compile.
     pub(crate) const fn checked(
         inputs: usize,
         hidden: usize,
@@ -229,8 +229,8 @@ impl<const H: usize, const O: usize> Network<H, O> {
     }
 
     /// Runs one forward pass: bit j of `inputs` is input j; bit k of the result is set if output k
-    /// is not negative. `hidden` holds the last hidden activations and receives the new ones;
-    /// without self-loops, the last activations are not used.
+    /// is not negative. `hidden` holds the previous hidden activations and receives the new ones;
+    /// without self-loops, the previous activations are not used.
     #[inline]
     pub(crate) fn forward(&self, inputs: u32, hidden: &mut Aligned<[i16; H]>) -> u16 {
         let mut terms = Aligned([0; MAX_TERMS]);

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// window, the noise draws and the step hashes.
 pub const MAX_SENSORS: usize = 14;
 
-/// A hidden neuron sums the sensors, the action value and its own last output.
+/// A hidden neuron sums the sensors, the action value and its own previous output.
 const _: () = assert!(MAX_SENSORS + 2 <= MAX_TERMS);
 
 /// A cell relative to a robot: steps ahead (negative: behind) and to the left (negative: right).

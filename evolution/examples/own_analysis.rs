@@ -1,7 +1,7 @@
 //! A custom analysis: the agreement of the robots' headings over the steps of a finished run.
 //!
 //! `cargo run --release -p minimal-surprise-evolution --example own_analysis -- RUN`, where `RUN`
-//! is a run directory; without it, the example makes a short run.
+//! is a run directory; without it, the example performs a short run.
 
 use minimal_surprise_evolution::evolving::until_finished;
 use minimal_surprise_evolution::experiment::Experiment;
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Makes a short run in `folder`.
+/// Performs a short run in `folder`.
 fn evolved(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
     let settings = Settings::builder()
         .population(8)

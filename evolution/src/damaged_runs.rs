@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Descriptions of what is wrong with runs, by run directory.
+/// Descriptions of the runs' problems, by run directory.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DamagedRuns(BTreeMap<PathBuf, String>);
 
@@ -37,7 +37,7 @@ impl DamagedRuns {
         self.0.contains_key(run)
     }
 
-    /// Returns the run directories and what is wrong with each.
+    /// Returns each run directory with a description of its problem.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (&Path, &str)> {
         self.0
             .iter()

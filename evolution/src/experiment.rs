@@ -17,7 +17,7 @@ use std::sync::atomic::AtomicBool;
 /// The result of a generation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GenerationRecord {
-    /// Number of the generation, from 0.
+    /// Generation number, counted from 0.
     pub generation: u32,
     /// Matches of the best genome.
     pub best_matches: u64,
@@ -46,7 +46,7 @@ pub struct GenerationRecord {
 #[derive(Clone, Debug)]
 pub struct Experiment {
     settings: Settings,
-    /// The next generation to evaluate; once the run is done, the last generation.
+    /// The next generation to evaluate; once the run is complete, the last generation.
     population: Population,
     history: Vec<GenerationRecord>,
     hash: RunHash,

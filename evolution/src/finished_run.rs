@@ -48,9 +48,9 @@ pub struct FinishedRun {
     pub temperature: Vec<f64>,
     /// Average prediction of every sensor.
     pub average_prediction: Vec<f64>,
-    /// Name, version and revision of the program that made the run.
+    /// Name, version and revision of the program that executed the run.
     pub program: String,
-    /// Time that the run took.
+    /// Time spent on the run.
     pub time: TimeSpent,
 }
 
@@ -114,7 +114,7 @@ pub enum ReadRunError {
     Value {
         /// The file.
         path: PathBuf,
-        /// The value, and what would be valid.
+        /// The value and the valid values.
         problem: String,
     },
     /// The files in the directory are inconsistent.
@@ -178,7 +178,7 @@ pub enum StateError {
 }
 
 impl ReadRunError {
-    /// Returns the error without advice on what to do.
+    /// Returns the error without advice for the user.
     #[must_use]
     pub fn cause(&self) -> &Self {
         match self {
@@ -433,7 +433,7 @@ impl FinishedRun {
     /// Reads a run directory if it exists and its run is complete.
     ///
     /// # Errors
-    /// Those of [`read`](Self::read).
+    /// See [`read`](Self::read).
     pub fn read_if_complete(path: &Path) -> Result<Option<Self>, ReadRunError> {
         if !files::exists(&path.join(DONE))? {
             return Ok(None);

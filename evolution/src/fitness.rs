@@ -1,6 +1,6 @@
 //! Custom fitness functions: any number computed from the plain world, step by step.
 //!
-//! The fast engine counts the paper's fitness, see [`generation_work`](crate::generation_work);
+//! The fast engine computes the paper's fitness (see [`generation_work`](crate::generation_work));
 //! [`Matches`] computes the same value in the plain world.
 
 use minimal_surprise_controller::{Controller, Genome};
@@ -31,7 +31,7 @@ impl Fitness for Matches {
     }
 }
 
-/// Evaluates genomes in parallel; returns the fitness of each, that of its worst trial, by slot.
+/// Evaluates genomes in parallel; returns the fitness of each in its worst trial, by slot.
 ///
 /// # Errors
 /// [`WorldError`] if a trial's poses do not fit the grid.

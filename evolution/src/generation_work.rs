@@ -2,7 +2,7 @@
 //!
 //! Every thread takes the next task as soon as it is free. Evaluation times differ between genomes,
 //! so that a thread may wait for another at the end; the last genomes are therefore split into
-//! halves of their repetitions. Results do not depend on which thread does which task.
+//! halves of their repetitions. Results do not depend on which thread executes which task.
 
 use minimal_surprise_controller::{Genome, Topology};
 use minimal_surprise_sim::{Engine, EnginePath, Evaluation, Evaluator, Scenario, Trial, TrialSet};

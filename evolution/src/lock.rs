@@ -30,7 +30,7 @@ pub enum LockError {
 pub struct Holder {
     /// Host name.
     pub host: String,
-    /// Process id on that host.
+    /// Process ID on that host.
     pub process: u32,
 }
 

@@ -74,7 +74,7 @@ impl NewDir {
     /// Renames the directory to its final path, without the lock file.
     ///
     /// # Errors
-    /// Those of [`NewDir::publish_locked`].
+    /// See [`NewDir::publish_locked`].
     pub fn publish(self) -> Result<(), FileError> {
         // Cosmetic: failure to remove the lock file is ignored.
         let _ = fs::remove_file(self.part.join(LOCK));

@@ -55,7 +55,7 @@ impl Population {
         }
     }
 
-    /// Returns the number of the generation, from 0.
+    /// Returns the generation number, counted from 0.
     #[must_use]
     pub fn generation(&self) -> u32 {
         self.generation

@@ -1,4 +1,4 @@
-//! Range checks on values read from a run directory, made while parsing: a value out of range
+//! Range checks on values read from a run directory, performed while parsing: a value out of range
 //! causes an error with its position, so that drawings and loops only see valid values.
 
 use serde::de::Error;

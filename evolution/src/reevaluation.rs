@@ -66,7 +66,7 @@ pub struct ResilienceRow {
     pub share_start: Vec<f64>,
     /// Share of the robots present in the structure at the end, 0 to 1.
     pub share_end: Vec<f64>,
-    /// Similarity of the last state to the undamaged final state, 0 to 1.
+    /// Similarity of the state at the end to the undamaged final state, 0 to 1.
     pub similarity: Vec<f64>,
 }
 
@@ -96,7 +96,7 @@ pub fn resilience(
     Ok(vec![initial, starts, damaged])
 }
 
-/// Computes the row of [`resilience`] after damage.
+/// Computes the row that [`resilience`] returns for the damaged swarm.
 ///
 /// # Errors
 /// [`DamageError`] if the damaged area is invalid or the remaining swarm cannot be run.

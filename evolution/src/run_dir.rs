@@ -90,7 +90,7 @@ pub enum RunDirError {
 }
 
 impl RunDirError {
-    /// Returns the error without advice on what to do.
+    /// Returns the error without advice for the user.
     #[must_use]
     pub fn cause(&self) -> &dyn std::error::Error {
         match self {

@@ -3,7 +3,7 @@
 //! | file | contents |
 //! |---|---|
 //! | `config.toml` | [`Settings`], resolved, with the seed |
-//! | `meta.json` | [`Meta`]: which program made the run |
+//! | `meta.json` | [`Meta`]: provenance of the run |
 //! | `generations.csv` | one [`GenerationRow`] per generation |
 //! | `best.genome` | the last generation's best genome, as a container for robots |
 //! | `time.json` | [`TimeSpent`](crate::time_spent::TimeSpent), summed over all processes |
@@ -30,9 +30,9 @@ pub const GENERATIONS: &str = "generations.csv";
 pub const BEST: &str = "best.genome";
 /// Start and end of the final run.
 pub const FINAL: &str = "final.json";
-/// Time that the run took.
+/// Time spent on the run.
 pub const TIME: &str = "time.json";
-/// Marks a run as complete, and holds its hash.
+/// Mark of a complete run, which contains the run's hash.
 pub const DONE: &str = "DONE";
 /// State from which an incomplete run is resumed.
 pub const CHECKPOINT: &str = "checkpoint";
@@ -258,16 +258,18 @@ impl GenerationRow {
 /// Formats `generations.csv`.
 ///
 /// # Panics
-/// Never: rows of numbers are written to memory.
+/// Never: writing rows of numbers to memory cannot fail.
 #[must_use]
 pub fn generations(experiment: &Experiment) -> String {
     let mut table = csv::Writer::from_writer(Vec::new());
     for record in experiment.history() {
         table
             .serialize(GenerationRow::new(experiment.settings(), record))
-            .expect("rows of numbers are written to memory");
+            .expect("writing rows of numbers to memory cannot fail");
     }
-    let bytes = table.into_inner().expect("memory needs no flushing");
+    let bytes = table
+        .into_inner()
+        .expect("flushing a buffer in memory cannot fail");
     String::from_utf8(bytes).expect("numbers are ASCII")
 }
 

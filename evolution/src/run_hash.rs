@@ -1,4 +1,4 @@
-//! The hash of a run, which covers only what the run computed.
+//! The hash of a run, which covers only the computed results.
 //!
 //! A chain of SHA-256: `h ← SHA-256(h ‖ best ‖ total ‖ matches of slot 0, 1, …)` for every
 //! generation, starting from the SHA-256 of a fixed text; at the end

@@ -151,7 +151,7 @@ pub fn checked_identifier(text: &str) -> Result<&str, &'static str> {
 }
 
 /// Checks whether a character is neither visible nor an ordinary space: control characters, line
-/// ends, text direction marks, zero-width characters.
+/// breaks, text direction marks or zero-width characters.
 #[must_use]
 pub fn is_hidden(c: char) -> bool {
     c.is_control()
@@ -169,7 +169,7 @@ pub fn terminal(text: &str) -> String {
     visible(text, "")
 }
 
-/// Escapes text for a terminal, on several lines: line ends and tabs are kept.
+/// Escapes text for a terminal, on several lines: line breaks and tabs are kept.
 #[must_use]
 pub fn terminal_lines(text: &str) -> String {
     visible(text, "\n\t")
@@ -264,7 +264,7 @@ pub fn html(text: &str) -> String {
     escaped
 }
 
-/// Escapes text for Markdown: a paragraph, a list or a table cell.
+/// Escapes text for use in a Markdown paragraph, list or table cell.
 #[must_use]
 pub fn markdown(text: &str) -> String {
     let shown = terminal(text);
@@ -342,8 +342,8 @@ pub fn url(path: &Path) -> String {
 /// Prefix of a text that holds a path as a URL.
 const FILE_URL: &str = "file://";
 
-/// Converts a path to text for [`path_of_text`] to restore: unchanged if it is UTF-8, otherwise as
-/// a URL of the absolute path.
+/// Converts a path to text that [`path_of_text`] can convert back: unchanged if it is UTF-8,
+/// otherwise as a URL of the absolute path.
 #[must_use]
 pub fn text_of_path(path: &Path) -> String {
     match path.to_str() {
@@ -375,7 +375,7 @@ fn os_string(bytes: Vec<u8>) -> OsString {
 }
 
 /// Quotes an argument for a POSIX shell: printable, and on one line unless the argument ends with a
-/// line end.
+/// line break.
 #[must_use]
 pub fn shell_word(word: impl AsRef<OsStr>) -> String {
     let word = word.as_ref();
@@ -389,7 +389,7 @@ pub fn shell_word(word: impl AsRef<OsStr>) -> String {
     }
 }
 
-/// Quotes an argument as output of `printf`. The shell drops line ends at the end of a command's
+/// Quotes an argument as output of `printf`. The shell drops line breaks at the end of a command's
 /// output, so they are appended after it.
 fn printf_word(word: &[u8]) -> String {
     let line_ends = word.iter().rev().take_while(|&&byte| byte == b'\n').count();
@@ -438,9 +438,9 @@ pub enum TextError {
     /// The bytes are not UTF-8.
     #[error("line {line}: byte {byte} of the file is not UTF-8; save it as UTF-8")]
     NotUtf8 {
-        /// The line number, from 1.
+        /// Line number, counted from 1.
         line: usize,
-        /// The position of the byte in the file, from 1.
+        /// Position of the byte in the file, counted from 1.
         byte: usize,
     },
 }

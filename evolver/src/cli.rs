@@ -72,7 +72,7 @@ enum Command {
     Stop(PortArgs),
     /// Hardware in the loop: simulate a swarm whose robot 0 is on a serial port, and compare.
     Hil(HilArgs),
-    /// Import genome text of the program published by the paper's authors as genome files.
+    /// Import genomes from the text files of the program published by the paper's authors.
     Import(ImportArgs),
     /// Show the contents of a genome file.
     Inspect {

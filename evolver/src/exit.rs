@@ -18,7 +18,7 @@ pub enum Exit {
 }
 
 impl Exit {
-    /// Exits the program at once.
+    /// Exits the program immediately.
     pub fn now(self) -> ! {
         std::process::exit(self as i32)
     }

@@ -54,7 +54,7 @@ pub enum HilError<E> {
     /// Starting poses that do not fit the grid.
     #[error(transparent)]
     World(WorldError),
-    /// Failure of the robot to make a step.
+    /// Failure of the robot to perform a step.
     #[error(transparent)]
     Robot(E),
 }

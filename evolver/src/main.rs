@@ -1,4 +1,4 @@
-//! The program `evolver`.
+//! The `evolver` program.
 
 use std::process::ExitCode;
 

@@ -15,7 +15,7 @@ use std::fmt::Arguments;
 use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::sync::{LazyLock, OnceLock};
 
-/// Whether standard output is a terminal; checked at the start, since it may be closed later.
+/// True if standard output is a terminal; checked at the start, since it may be closed later.
 static STDOUT_IS_TERMINAL: LazyLock<bool> = LazyLock::new(|| stdout().is_terminal());
 static STDERR_IS_TERMINAL: LazyLock<bool> = LazyLock::new(|| stderr().is_terminal());
 static LOCALE_IS_UTF8: LazyLock<bool> = LazyLock::new(locale_is_utf8);
@@ -110,8 +110,8 @@ pub(crate) fn check(written: io::Result<()>) {
     }
 }
 
-/// Writes to standard output during long work. If that fails, asks the work to stop at a point from
-/// which it can be resumed; [`lost`] then returns the error.
+/// Writes to standard output during long work. If that fails, requests a stop at the next point
+/// from which the work can be resumed; [`lost`] then returns the error.
 pub(crate) fn event(text: Arguments<'_>) {
     if let Err(error) = try_write(text) {
         // Keep the first error.
@@ -120,7 +120,7 @@ pub(crate) fn event(text: Arguments<'_>) {
     }
 }
 
-/// Returns the error if work was asked to stop because writing to standard output failed.
+/// Returns the error if a stop was requested because writing to standard output failed.
 pub(crate) fn lost() -> Option<&'static io::Error> {
     LOST.get()
 }

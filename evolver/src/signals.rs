@@ -20,21 +20,21 @@ const SIGNALS: [i32; 2] = [consts::SIGINT, consts::SIGTERM];
 /// its shell, count as one.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Whether work should stop at a point from which it can be resumed.
+/// True if a stop was requested, at the next point from which the work can be resumed.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// Returns the flag that asks work to stop at a point from which it can be resumed.
+/// Returns the flag that requests a stop at the next point from which the work can be resumed.
 #[must_use]
 pub fn stop() -> &'static AtomicBool {
     &STOP
 }
 
-/// Asks work to stop at a point from which it can be resumed.
+/// Requests a stop at the next point from which the work can be resumed.
 pub fn ask_to_stop() {
     STOP.store(true, Ordering::Relaxed);
 }
 
-/// Waits until this moment, or until work should stop.
+/// Waits until this moment, or until a stop is requested.
 pub fn wait_until(moment: Instant) {
     loop {
         let left = moment.saturating_duration_since(Instant::now());
@@ -45,18 +45,18 @@ pub fn wait_until(moment: Instant) {
     }
 }
 
-/// Installs signal handling: the first signal asks work to stop after this generation, the second
+/// Installs signal handling: the first signal requests a stop after this generation, the second
 /// exits immediately. In both cases the run can be resumed.
 ///
 /// # Errors
 /// If the signal handlers cannot be installed.
 pub fn stop_on_signal() -> io::Result<&'static AtomicBool> {
-    ask_then_end("ending after this generation", || {})?;
+    ask_then_end("stopping after this generation", || {})?;
     Ok(stop())
 }
 
-/// Installs signal handling: the first signal prints `words` and asks work to stop, the second
-/// calls `last` and exits.
+/// Installs signal handling: the first signal prints `words` and requests a stop, the second calls
+/// `last` and exits.
 ///
 /// # Errors
 /// If the signal handlers cannot be installed.
@@ -69,7 +69,7 @@ pub fn ask_then_end(words: &'static str, last: impl Fn() + Send + 'static) -> io
         }
         asked = true;
         ask_to_stop();
-        tell!("\n{words}; press Ctrl-C again to end at once");
+        tell!("\n{words}; press Ctrl-C again to exit immediately");
     })
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Linking this module also links the logger and the critical section that the logger needs.
 //!
-//! Uses `unsafe` because the wheels' register is an address.
+//! Uses `unsafe` to access the wheels' register by address.
 #![allow(unsafe_code)]
 
 use crate::faults::{Fault, WheelsOff};

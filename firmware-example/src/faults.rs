@@ -9,7 +9,7 @@
 //! [`guard_stack`] forbids access below RAM. So a stack overflow causes a fault immediately, and no
 //! variable is overwritten.
 //!
-//! Uses `unsafe` because registers are addresses, and for handlers in assembler.
+//! Uses `unsafe` to access registers by address and for handlers written in assembly.
 #![allow(unsafe_code)]
 
 use core::{fmt, ptr};

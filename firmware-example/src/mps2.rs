@@ -3,7 +3,7 @@
 //! The wheels are two lights, and the sensors detect one simulated neighbour; the host drives the
 //! robot with step requests.
 //!
-//! Uses `unsafe` because device registers and the arguments of semihosting are addresses.
+//! Uses `unsafe` to access device registers and to pass semihosting arguments by address.
 #![allow(unsafe_code)]
 
 use crate::emulator::WHEELS;

@@ -140,7 +140,7 @@ pub fn draw_genome(topology: Topology, mutations: u32, rng: &mut ChaCha8Rng) -> 
     genome
 }
 
-/// Draws the next reading, similar to those of a robot: half of the time the last reading, a
+/// Draws the next reading, similar to those of a robot: half of the time the previous reading, a
 /// quarter of the time with one sensor changed, a quarter of the time a new random reading.
 #[must_use]
 pub fn draw_sensors(last: SensorBits, rng: &mut ChaCha8Rng) -> SensorBits {

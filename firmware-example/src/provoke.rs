@@ -1,4 +1,4 @@
-//! Triggers faults to check that the wheels stop. For the programs `faults`, under QEMU only.
+//! Triggers faults to check that the wheels stop. For the `faults` programs, under QEMU only.
 //!
 //! Uses `unsafe`, because safe code cannot cause faults.
 #![allow(unsafe_code)]

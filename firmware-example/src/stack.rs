@@ -14,7 +14,7 @@ pub const DEPTH_MAX: u32 = 8192;
 const PAINT: u32 = 0x7a7a_a5a5;
 
 /// Returns the number of stack bytes, up to [`DEPTH_MAX`], that are used by `work` and the
-/// functions it calls. No interrupt may occur.
+/// functions it calls. Interrupts must be disabled.
 ///
 /// The measured depth ends at the deepest word written; a frame may extend deeper without using it.
 #[inline(never)]

@@ -106,7 +106,7 @@ impl Recording {
         )
     }
 
-    /// Damages the final state of an evolution, and records how the swarm continues.
+    /// Damages the final state of an evolution, and records the run that follows.
     ///
     /// # Errors
     /// [`DamageError`] if no robot is left to run.

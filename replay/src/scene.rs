@@ -39,14 +39,14 @@ pub struct Scene {
     pub picked: Option<usize>,
 }
 
-/// A robot to draw: an arrow.
+/// A robot, drawn as an arrow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Robot {
     /// Number of cells from the west edge.
     pub x: u16,
     /// Number of cells from the south edge.
     pub y: u16,
-    /// 0 east, 1 north, 2 west, 3 south.
+    /// Heading: 0 east, 1 north, 2 west, 3 south.
     pub heading: u8,
     /// Colour and shape.
     pub ink: Ink,

@@ -36,7 +36,7 @@ pub struct Client {
     session: u32,
     /// Number of the next request; `None` after 2³² requests.
     next: Option<u32>,
-    /// Number of the request whose reply is pending, and how often it was sent.
+    /// Number of the request whose reply is pending, and the number of times it was sent.
     pending: Option<(u32, u32)>,
     attempts_max: u32,
     wire: [u8; WIRE_BYTES_MAX],
@@ -66,7 +66,7 @@ pub enum RequestError {
     SessionExhausted,
 }
 
-/// Error if the robot has not replied. The robot may or may not have executed the request.
+/// Error: the robot has not replied. The robot may or may not have executed the request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no reply to a request sent {attempts} times")]
 pub struct GaveUp {
@@ -183,8 +183,8 @@ impl Client {
         self.strays
     }
 
-    /// Returns why the last malformed frame was not a message of this protocol. This distinguishes
-    /// a different device or protocol version from silence.
+    /// Returns the reason why the last malformed frame was not a message of this protocol. This
+    /// distinguishes a different device or protocol version from silence.
     #[must_use]
     pub fn last_malformed(&self) -> Option<MalformedMessage> {
         self.last_malformed

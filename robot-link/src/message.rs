@@ -238,8 +238,10 @@ pub struct LineCounters {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
-    /// The session is unknown: the robot was restarted, or a different host uses the line.
-    #[error("the robot has lost the session: it was restarted, or another program uses the line")]
+    /// The session is unknown: the robot was restarted, or a different host is using the line.
+    #[error(
+        "the robot has lost the session: it was restarted, or another program is using the line"
+    )]
     NoSession,
     /// The robot must be stopped first.
     #[error("the robot is running; stop it first")]
@@ -284,7 +286,7 @@ pub enum Refusal {
 #[non_exhaustive]
 pub enum MalformedMessage {
     /// The message has a different protocol version.
-    #[error("protocol version {found}; this program speaks version {PROTOCOL_VERSION}")]
+    #[error("protocol version {found}; this program uses version {PROTOCOL_VERSION}")]
     OtherVersion {
         /// The first byte of the message.
         found: u8,

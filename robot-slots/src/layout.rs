@@ -60,7 +60,7 @@ impl Header {
     }
 
     /// Returns the bytes before the container in a committed slot: the header and its commit
-    /// record. For programs that write a whole slot at once.
+    /// record. Use this to write a whole slot at once.
     #[must_use]
     pub fn front(self) -> [u8; CONTAINER_AT as usize] {
         let mut front = [0xff; CONTAINER_AT as usize];

@@ -400,8 +400,8 @@ impl<F: NorFlash> Slots<F> {
         self.update.map(|update| update.taken)
     }
 
-    /// Performs a whole update. Rejects bytes that are not a genome that can be run before anything
-    /// is erased; then begins, writes and commits. Returns the write count.
+    /// Performs a whole update. Before erasing anything, rejects bytes that are not a runnable
+    /// genome; then begins, writes and commits. Returns the write count.
     ///
     /// # Errors
     /// [`UpdateError::ImpossibleLength`], [`UpdateError::CountExhausted`],

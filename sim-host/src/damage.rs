@@ -114,8 +114,8 @@ impl Damage {
     /// numbers.
     ///
     /// # Errors
-    /// [`DamageError`] if the area is on a different grid, the poses do not fit the grid, or the
-    /// free cells are too few for the robots to reposition.
+    /// [`DamageError`] if the area is on a different grid, the poses do not fit the grid, or there
+    /// are too few free cells for the robots to be repositioned.
     pub fn apply(
         self,
         grid: Grid,

@@ -57,7 +57,7 @@ pub enum DrawingError {
     /// The rows have different lengths.
     #[error("line {line} has {found} cells, the first row {expected}")]
     UnevenRows {
-        /// Number of the line in the text, from 1.
+        /// Line number in the text, counted from 1.
         line: usize,
         /// Number of cells in the line.
         found: usize,
@@ -67,7 +67,7 @@ pub enum DrawingError {
     /// The drawing contains a character that is neither an arrow nor an empty cell.
     #[error("line {line}: {found:?}; cells are ▶ ▲ ◀ ▼, hollow ▷ △ ◁ ▽, or ·")]
     UnknownCharacter {
-        /// Number of the line in the text, from 1.
+        /// Line number in the text, counted from 1.
         line: usize,
         /// The character.
         found: char,

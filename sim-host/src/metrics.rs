@@ -115,7 +115,7 @@ pub struct Measures {
     model: SensorModel,
     poses: Vec<Pose>,
     predictions: Vec<SensorBits>,
-    /// Number of bits mispredicted in the last step, per robot.
+    /// Number of bits mispredicted in the latest step, per robot.
     mispredicted_now: Vec<u8>,
     motion: Motion,
     /// Number of bits mispredicted, per step.
@@ -142,7 +142,7 @@ impl Measures {
         }
     }
 
-    /// Adds the last step of the world.
+    /// Adds the step that the world has just run.
     ///
     /// # Panics
     /// If the world has a different number of robots.
@@ -276,8 +276,8 @@ impl Measures {
         self.mispredicted.iter().map(|&n| ratio(n, bits)).collect()
     }
 
-    /// Returns the surprise of each robot in the last step, 1/R Σᵣ |pₙʳ(t) − sₙʳ(t)|, from 0 to 1;
-    /// 0 before the first step.
+    /// Returns the surprise of each robot in the latest step, 1/R Σᵣ |pₙʳ(t) − sₙʳ(t)|, from 0 to
+    /// 1; 0 before the first step.
     #[must_use]
     pub fn surprise_of_robots(&self) -> Vec<f64> {
         let bits = self.model.sensors() as u64;

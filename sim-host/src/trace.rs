@@ -34,7 +34,7 @@ impl Trace {
         }
     }
 
-    /// Adds the last step of the world.
+    /// Adds the step that the world has just run.
     pub fn record(&mut self, world: &World) {
         let before = core::mem::replace(&mut self.final_poses, world.poses().to_vec());
         self.steps.push(TraceStep {

@@ -47,9 +47,10 @@ pub enum WorldError {
 /// Checks that every robot is on the grid and no two share a cell.
 ///
 /// # Errors
-/// [`WorldError`] if a robot is outside the grid or two share a cell; describes the first one.
+/// [`WorldError`] if a robot is outside the grid or two share a cell; it describes the first such
+/// robot.
 pub fn check_poses(grid: Grid, poses: &[Pose]) -> Result<(), WorldError> {
-    // Memory and time depend only on the number of robots: a file with few robots may contain any
+    // Memory and time depend only on the number of robots: a file with few robots may specify any
     // grid size.
     let mut cells = Vec::with_capacity(poses.len());
     for (robot, &Pose { x, y, .. }) in poses.iter().enumerate() {
@@ -215,14 +216,14 @@ impl World {
         &self.states
     }
 
-    /// Returns the sensor readings of the last step, including noise; bits beyond the model's
+    /// Returns the sensor readings of the latest step, including noise; bits beyond the model's
     /// sensors are zero.
     #[must_use]
     pub fn readings(&self) -> &[SensorBits] {
         &self.readings
     }
 
-    /// Returns the robots' decisions in the last step; empty before the first step.
+    /// Returns the robots' decisions in the latest step; empty before the first step.
     #[must_use]
     pub fn decisions(&self) -> &[Decision] {
         &self.decisions

@@ -194,7 +194,7 @@ pub struct Faulted {
     pub log: String,
 }
 
-/// Runs the program `faults` of `mps2`, which triggers this fault and exits.
+/// Runs the `faults` program of `mps2`, which triggers this fault and exits.
 ///
 /// # Errors
 /// [`Missing`] if QEMU is not installed.
@@ -217,7 +217,7 @@ pub fn fault_on_mps2(elf: &Path, fault: &str, trace: &Path) -> Result<Faulted, M
     })
 }
 
-/// Runs the program `faults-stm32f4`, which triggers this fault, until it has written to the
+/// Runs the `faults-stm32f4` program, which triggers this fault, until it has written to the
 /// wheels' registers three times: to turn the wheels, and twice to stop them.
 ///
 /// # Errors
@@ -265,7 +265,8 @@ fn lines(path: &Path, start: &str) -> Vec<String> {
 /// its exit status.
 ///
 /// # Errors
-/// [`Missing`] if QEMU is not installed; the inner error comes from the file, its log or QEMU.
+/// [`Missing`] if QEMU is not installed; the inner error reports that the file or its log cannot be
+/// read, or that QEMU cannot be run.
 pub fn run(elf: &Path, line: impl FnMut(String)) -> Result<io::Result<ExitStatus>, Missing> {
     run_with(QEMU_ARGUMENTS, elf, line)
 }

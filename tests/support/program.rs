@@ -1,4 +1,4 @@
-//! Runs the program `evolver` as a user would, in a separate folder.
+//! Runs the `evolver` program as a user would, in a separate folder.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -282,7 +282,7 @@ impl Running {
     /// # Panics
     /// If the process has exited.
     pub fn signal(&self, signal: &str) {
-        // Uses the shell's builtin, because a minimal system lacks the program `kill`.
+        // Uses the shell's builtin, because a minimal system lacks the `kill` program.
         let command = format!("kill -{signal} {}", self.child.id());
         let sent = Command::new("sh").args(["-c", &command]).status();
         assert!(sent.is_ok_and(|status| status.success()), "{command}");

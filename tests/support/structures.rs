@@ -115,7 +115,7 @@ impl Counts {
 
 /// A recorded state.
 pub struct State {
-    /// Line number in the file, from 1.
+    /// Line number in the file, counted from 1.
     pub line: usize,
     /// Source of the state.
     pub source: String,

@@ -35,13 +35,13 @@ impl FileError {
         Self::at(path)(error)
     }
 
-    /// Checks whether nothing was written because the path exists.
+    /// Returns true if the path already exists; nothing was written in that case.
     #[must_use]
     pub fn is_exists(&self) -> bool {
         self.error.kind() == ErrorKind::AlreadyExists
     }
 
-    /// Checks whether a different path could work, as opposed to a failure of the system.
+    /// Returns true if a different path could work; false for a failure of the system.
     #[must_use]
     pub fn is_bad_path(&self) -> bool {
         use ErrorKind as Kind;
@@ -110,7 +110,7 @@ pub const DATA_BYTES_MAX: u64 = 256 << 20;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TooLarge {
-    /// The size of the file exceeds the limit.
+    /// The file is larger than the limit.
     #[error("it has {found} bytes; at most {most} are read")]
     Sized {
         /// The size of the file.

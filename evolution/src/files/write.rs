@@ -55,7 +55,7 @@ pub fn remove_old_parts(folder: &Path) {
 /// Writes a file, replacing an existing one only if `existing` allows it.
 ///
 /// # Errors
-/// Those of [`create`] or [`replace`].
+/// See [`create`] and [`replace`].
 pub fn write(path: &Path, contents: &[u8], existing: Existing) -> Result<(), FileError> {
     match existing {
         Existing::Refuse => create(path, contents),

@@ -1,9 +1,9 @@
 //! Memory and disk that a command needs, estimated from its settings before anything is allocated
 //! or written. A command that needs more than is available is rejected.
 //!
-//! Estimates are of the peak and, above some ten megabytes, right within a factor of two; the test
-//! `limits` measures this. If the system does not report how much is available, no command is
-//! rejected.
+//! Estimates are of the peak and, above about ten megabytes, accurate to within a factor of two;
+//! the `limits` test measures this. If the system does not report how much is available, no command
+//! is rejected.
 
 #[cfg(feature = "files")]
 mod machine;
@@ -116,7 +116,7 @@ const fn size<T>() -> f64 {
 }
 
 impl Needs {
-    /// Estimates an evolution and its run directory.
+    /// Estimates the needs of an evolution and its run directory.
     #[must_use]
     pub fn of_evolution(settings: &Settings, threads: f64) -> Self {
         let scenario = settings.scenario();
@@ -192,7 +192,7 @@ impl Needs {
         }
     }
 
-    /// Estimates the evaluation of a genome from new starts, with all outcomes kept.
+    /// Estimates the needs of the evaluation of a genome from new starts, with all outcomes kept.
     #[must_use]
     pub fn of_starts<T>(
         scenarios: &[(Scenario, T)],
@@ -223,7 +223,7 @@ impl Needs {
         }
     }
 
-    /// Estimates a run with every state kept.
+    /// Estimates the needs of a run with every state kept.
     #[must_use]
     pub fn of_recording(scenario: &Scenario) -> Self {
         let [robots, cells, steps] = world(scenario);
@@ -243,7 +243,8 @@ impl Needs {
         }
     }
 
-    /// Estimates a run with every state kept and exported as text in the authors' format.
+    /// Estimates the needs of a run with every state kept and exported as text in the authors'
+    /// format.
     #[must_use]
     pub fn of_trajectory(scenario: &Scenario) -> Self {
         let mut needs = Self::of_recording(scenario);
@@ -272,8 +273,8 @@ impl Needs {
         self
     }
 
-    /// Estimates a hardware-in-the-loop run: the decisions of robot 0, on the robot and in
-    /// simulation.
+    /// Estimates the needs of a hardware-in-the-loop run: the decisions of robot 0, on the robot
+    /// and in simulation.
     #[must_use]
     pub fn of_hil(scenario: &Scenario) -> Self {
         let [robots, cells, steps] = world(scenario);
@@ -300,7 +301,7 @@ impl Needs {
     /// Checks that there is enough memory.
     ///
     /// # Errors
-    /// [`TooMuch`] if there is not; the message names the settings to change.
+    /// [`TooMuch`] if more is needed than available; the message names the settings to change.
     pub fn check_memory(&self) -> Result<(), TooMuch> {
         check(&self.memory, Place::Memory)
     }
@@ -308,7 +309,7 @@ impl Needs {
     /// Checks that there is enough space on the disk of a directory, which need not exist.
     ///
     /// # Errors
-    /// [`TooMuch`] if there is not; the message names the settings to change.
+    /// [`TooMuch`] if more is needed than available; the message names the settings to change.
     pub fn check_disk(&self, directory: &Path) -> Result<(), TooMuch> {
         check(&self.disk, Place::Disk(directory.to_owned()))
     }
@@ -324,13 +325,13 @@ impl Needs {
     }
 }
 
-/// Memory and disk needed by runs that are done one after the other.
+/// Memory and disk space needed by runs that are executed one after the other.
 #[derive(Clone, Debug, Default)]
 pub struct NeedsOfRuns {
-    /// Largest run: its memory, and its disk until it is complete.
+    /// Memory and, until it is complete, disk space that the largest run needs.
     largest: Needs,
     runs: u64,
-    /// Bytes of disk that complete runs keep: of all runs, and of the largest.
+    /// Bytes of disk space that complete runs keep: all runs, and the largest.
     left: f64,
     left_most: f64,
 }
@@ -361,7 +362,7 @@ impl NeedsOfRuns {
         needs
     }
 
-    /// Returns the least disk that the runs need once `done` of them are complete.
+    /// Returns the minimum disk space that the runs need once `done` of them are complete.
     #[must_use]
     pub fn at_least_without(&self, done: u64) -> Needs {
         let left = (self.left - done as f64 * self.left_most).max(0.0);
@@ -380,7 +381,7 @@ impl NeedsOfRuns {
     }
 }
 
-/// Checks that the sum of all parts is available.
+/// Checks that enough is available for all parts together.
 fn check(parts: &[Part], place: Place) -> Result<(), TooMuch> {
     let needed = total(parts) as u64;
     match (
@@ -399,7 +400,7 @@ fn check(parts: &[Part], place: Place) -> Result<(), TooMuch> {
     }
 }
 
-/// Estimates the robots on their grid.
+/// Estimates the memory for the robots on their grid.
 fn swarm(scenario: &Scenario, bytes: f64) -> Part {
     let (robots, grid) = (scenario.robots(), scenario.grid());
     Part {
@@ -486,8 +487,8 @@ pub fn checkpoint_bytes(settings: &Settings) -> f64 {
 /// Returns the maximum number of bytes to read from a file with this estimated size.
 #[must_use]
 pub fn most(estimate: f64) -> u64 {
-    // Estimates are right within a factor of two; the constant covers the fixed parts of small
-    // files.
+    // Estimates are accurate to within a factor of two; the constant covers the fixed parts of
+    // small files.
     (2.0 * estimate) as u64 + TEXT_BYTES_MAX
 }
 

@@ -86,8 +86,8 @@ impl SettingsBuilder {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`SettingError`] if a setting is invalid; the message names the setting, the value and what
-    /// would be valid.
+    /// [`SettingError`] if a setting is invalid; the message names the setting, its value and the
+    /// valid values.
     pub fn build(self) -> Result<Settings, SettingError> {
         let mut values = self.0;
         let seed = values.seed.unwrap_or(0);
@@ -103,7 +103,7 @@ impl SettingsBuilder {
 }
 
 impl Settings {
-    /// Returns a builder for settings made by a program.
+    /// Returns a builder for settings defined in a program.
     #[must_use]
     pub fn builder() -> SettingsBuilder {
         SettingsBuilder::default()
@@ -112,8 +112,8 @@ impl Settings {
     /// Checks all given values and fills in the paper's defaults (Tab. 3).
     ///
     /// # Errors
-    /// [`SettingError`] if a setting is invalid; the message names the place, the value and what
-    /// would be valid.
+    /// [`SettingError`] if a setting is invalid; the message names the place, the value and the
+    /// valid values.
     pub fn resolve(
         overrides: &Overrides,
         draw_seed: impl FnOnce() -> u64,

@@ -1,6 +1,7 @@
 //! The table of settings, which defines each setting in one entry.
 //!
-//! The table generates flags, their help, keys of files, lists of suites, documents and errors.
+//! The table generates the flags, their help, configuration keys, suite lists, documents and error
+//! messages.
 
 use super::values::{
     COUNT_MAX, THREADS_MAX, count, grid, model, model_name, probability, seed, template,
@@ -131,7 +132,7 @@ macro_rules! settings {
             }
         }
 
-        /// Settings made by a program. Unset values default to those of the paper; the seed
+        /// Settings defined in a program. Unset values default to those of the paper; the seed
         /// defaults to 0.
         ///
         /// ```
@@ -186,7 +187,7 @@ settings! {
     /// Swarm size.
     robots(u32): u32 = 100,
     "robots", "N", default "100",
-    valid "from 1 to the cells of the grid", list "robots",
+    valid "from 1 to the number of cells of the grid", list "robots",
     parse |text, values: &Values| count(text, values.grid.cells()),
     write |&robots: &u32| Some(robots.into());
 

@@ -1,4 +1,4 @@
-//! The baseline: a straightforward `f32` program of the same model.
+//! The baseline: a straightforward `f32` implementation of the same model.
 //!
 //! It uses tanh of the standard library, and computes input activations once per genome and hidden
 //! activations once per step. It runs in the plain world. Its results differ from the integer
@@ -100,7 +100,7 @@ impl Robots {
         }
     }
 
-    /// Makes one step of all robots.
+    /// Performs one step of all robots.
     pub fn step(&mut self, networks: &Networks, readings: &[SensorBits]) -> Vec<Decision> {
         let robots = self.hidden.iter_mut().zip(&mut self.actions);
         let robots = robots.zip(&mut self.predictions).zip(readings);

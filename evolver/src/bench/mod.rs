@@ -2,7 +2,7 @@
 //!
 //! All speeds are measured on early, middle and late populations of real evolutions
 //! ([`populations`]), in robot-steps per CPU-second on one thread. The baseline is a
-//! straightforward floating-point program of the same model ([`f32_program`]).
+//! straightforward floating-point implementation of the same model ([`f32_program`]).
 
 pub mod f32_program;
 pub mod populations;
@@ -35,7 +35,7 @@ pub struct Report {
     /// Cost of a robot-step with 1,000,000 robots on 1500 × 1500 relative to 100 on 15 × 15, both
     /// without the shortcut.
     pub million_robots_over_100: f64,
-    /// Largest memory of a default evolution, in MB; `None` if the system does not report it.
+    /// Peak memory use of a default evolution, in MB; `None` if the system does not report it.
     pub peak_rss_mb: Option<f64>,
 }
 

@@ -15,7 +15,7 @@ use minimal_surprise_evolution::text::terminal_path;
 use minimal_surprise_sim::{NoiseRate, Scenario, SeedTree};
 use std::path::{Path, PathBuf};
 
-/// Conditions as flags; from lists, all combinations are evaluated.
+/// Conditions as flags; all combinations of listed values are evaluated.
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
     /// The genome file, or a run directory; if config.toml is in the same directory, its conditions

@@ -62,7 +62,7 @@ impl EvolveArgs {
 /// Implementation of the evaluation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum EngineName {
-    /// The straightforward program.
+    /// The straightforward implementation.
     Plain,
     /// The fast engine, with the best instructions that this processor supports; the environment
     /// variable MINIMAL_SURPRISE_PATH forces portable, avx2 or avx512.
@@ -70,7 +70,7 @@ pub enum EngineName {
     Fast,
 }
 
-/// Options that no result depends on.
+/// Options that do not affect results.
 #[derive(Clone, Copy, Debug)]
 struct RunOptions {
     progress: ProgressMode,

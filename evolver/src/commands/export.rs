@@ -36,7 +36,7 @@ pub struct ExportArgs {
         allow_hyphen_values = true
     )]
     address: String,
-    /// For slot: write count of this genome, from 1. The robot runs the genome with the larger
+    /// For slot: write count of this genome, at least 1. The robot runs the genome with the larger
     /// write count; `flash` prints it.
     #[arg(
         long,
@@ -54,7 +54,7 @@ pub struct ExportArgs {
     chip: String,
 }
 
-/// Formats of other programs.
+/// Formats for other programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// The genome container, for firmware that reads it at a fixed address; also prints the
@@ -76,7 +76,7 @@ pub enum Format {
 /// Exports a genome or a run.
 ///
 /// # Errors
-/// [`BadInput`] if the genome or run cannot be read, or the file exists.
+/// [`BadInput`] if the genome or run cannot be read, or the output file already exists.
 pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
     if arguments.name.is_some() && !matches!(arguments.format, Format::C | Format::Rust) {
         return Err(BadInput::new("--name requires --format c or --format rust").into());

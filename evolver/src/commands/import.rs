@@ -1,4 +1,5 @@
-//! `evolver import`: converts genome text of the authors' program to genome containers.
+//! `evolver import`: converts genomes from the text files of the authors' program to genome
+//! containers.
 
 use super::errors::unusable;
 use super::{BadInput, flag};

@@ -38,12 +38,12 @@ impl PortArgs {
         PortName(self.port.clone())
     }
 
-    /// Checks the flags and connects. Afterwards, the first signal ends the work with the robot and
-    /// the second exits.
+    /// Checks the flags and connects. Afterwards, the first signal stops the work with the robot
+    /// and the second exits immediately.
     pub(super) fn connect(&self) -> anyhow::Result<Robot> {
         let baud = flag("baud", &self.baud, |text| count(text, 12_000_000))?;
         let wait = flag("wait", &self.wait, |text| count(text, 3600))?;
-        ask_then_end("ending", || {
+        ask_then_end("stopping", || {
             if let Some(words) = standing() {
                 tell!("{words}");
             }

@@ -79,14 +79,14 @@ impl FromArgMatches for SettingFlags {
     }
 }
 
-/// Settings of a run of a genome that are not in the genome file.
+/// Settings needed to run a genome that its file does not contain.
 const CONDITIONS: [&str; 5] = ["grid", "robots", "steps", "noise", "seed"];
 
 fn conditions() -> impl Iterator<Item = &'static Setting> {
     SETTINGS.iter().filter(|s| CONDITIONS.contains(&s.name))
 }
 
-/// The flags for a run of a genome file.
+/// Flags for running a genome file.
 #[derive(Clone, Debug, Default)]
 pub struct GenomeConditions(Overrides);
 

@@ -29,8 +29,8 @@ pub struct SuiteProgress<'a> {
 }
 
 impl<'a> SuiteProgress<'a> {
-    /// Starts the display and its clock; of `runs` runs, `waiting` are still to be done and need
-    /// `left` robot-steps.
+    /// Starts the display and its clock; of `runs` runs, `waiting` are still to be executed and
+    /// need `left` robot-steps.
     #[must_use]
     pub fn start(mode: ProgressMode, plan: &'a Plan, runs: u64, waiting: u64, left: u64) -> Self {
         let bar = || ProgressBar::new(runs).with_position(runs - waiting);

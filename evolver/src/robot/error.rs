@@ -55,7 +55,7 @@ pub enum Problem {
         seconds: f64,
         /// The baud rate.
         baud: u32,
-        /// Whether another program may have read the reply.
+        /// Possibility that another program has read the reply.
         reader: OtherReader,
     },
     /// Bytes were received, but no reply from a robot.
@@ -67,7 +67,7 @@ pub enum Problem {
         heard: Heard,
         /// The baud rate.
         baud: u32,
-        /// Whether another program may have read the reply.
+        /// Possibility that another program has read the reply.
         reader: OtherReader,
     },
     /// The robot uses different arithmetic.
@@ -91,7 +91,7 @@ pub enum Problem {
     Unanswered {
         /// The robot's activity at that time.
         doing: Doing,
-        /// Whether another program may have read the reply.
+        /// Possibility that another program has read the reply.
         reader: OtherReader,
     },
     /// The user interrupted the command.
@@ -128,11 +128,11 @@ pub enum Problem {
     },
 }
 
-/// The end of a message about a robot that has not answered yet.
+/// End of a message about a robot that has not replied yet.
 const RESTARTS: &str =
     "; a board that restarts when its port is opened may need a longer wait, such as --wait 10";
 
-/// Whether another program reads the same port.
+/// Possibility that another program reads the same port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OtherReader {
     /// Possibly.

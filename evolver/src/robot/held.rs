@@ -37,7 +37,7 @@ impl Robot {
         work: impl FnOnce(&mut Self) -> Result<T, RobotError>,
     ) -> Result<T, RobotError> {
         let was_running = self.identity.running;
-        let words = format!("the robot may be stopped now; start it with: {start_command}");
+        let words = format!("the robot may still be stopped; start it with: {start_command}");
         set_standing(was_running.then(|| words.clone()));
         let mut held = Held {
             runs: was_running,
@@ -62,7 +62,7 @@ impl Robot {
 
 struct Held<'r> {
     robot: &'r mut Robot,
-    /// Whether the robot should run afterwards.
+    /// True if the robot should run afterwards.
     runs: bool,
     starts_anew: bool,
     words: String,

@@ -26,9 +26,9 @@ pub(super) struct Line {
     client: Client,
     /// Number of bytes received in this conversation.
     received: u64,
-    /// Whether any reply was ever received.
+    /// True once any reply has been received.
     answered: bool,
-    /// Whether bytes had arrived but another program read them first.
+    /// True if bytes had arrived but another program read them first.
     shared: bool,
     /// Set to stop sending requests.
     stop: &'static AtomicBool,

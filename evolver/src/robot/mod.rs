@@ -33,7 +33,7 @@ pub struct Identity {
     pub kernel: KernelId,
     /// The genome in use.
     pub genome: GenomeInUse,
-    /// Whether the control loop runs.
+    /// True if the control loop is running.
     pub running: bool,
     /// The robot's faults.
     pub faults: Faults,
@@ -109,7 +109,7 @@ pub struct Robot {
     identity: Identity,
     /// Number of steps requested since the last reset.
     steps: u64,
-    /// The robot's last report in this conversation.
+    /// The robot's latest report in this conversation.
     reported: Option<Surprise>,
 }
 
@@ -140,7 +140,7 @@ impl Robot {
         self.line.finish();
     }
 
-    /// Returns the robot's last identification.
+    /// Returns the robot's latest identification.
     #[must_use]
     pub fn identity(&self) -> &Identity {
         &self.identity
@@ -244,7 +244,8 @@ impl Robot {
         self.done(Doing::Switching, &Request::Reset)
     }
 
-    /// Makes one control step with these readings. The robot must be stopped and have been reset.
+    /// Performs one control step with these readings. The robot must be stopped and have been
+    /// reset.
     ///
     /// # Errors
     /// [`RobotError`] if the robot does not answer or rejects the request.

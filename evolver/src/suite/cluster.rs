@@ -26,7 +26,7 @@ pub struct Job<'a> {
     pub directory: &'a Path,
     /// Number of tasks.
     pub shards: u32,
-    /// Maximum number of tasks at once.
+    /// Maximum number of tasks that run at the same time.
     pub at_once: Option<u32>,
     /// Flags that choose the runs.
     pub flags: Vec<String>,

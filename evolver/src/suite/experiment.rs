@@ -23,7 +23,7 @@ pub struct ExperimentTable {
     pub predictions: Vec<String>,
     /// Seed of the first run.
     pub first_seed: u64,
-    /// Whether the experiment is left out unless requested.
+    /// True if the experiment is left out unless requested.
     pub optional: bool,
     /// Values of other settings, by setting name.
     values: BTreeMap<&'static str, Vec<String>>,

@@ -76,7 +76,7 @@ pub struct PlannedRun {
     pub settings: Settings,
     /// Index of the first experiment that includes the run.
     experiment: usize,
-    /// Number of the run in that experiment, from 1.
+    /// Number of the run in that experiment, counted from 1.
     place: u64,
 }
 
@@ -103,6 +103,8 @@ impl PlannedExperiment {
         (0..self.asked.combinations()).map(|combination| self.combination(combination))
     }
 
+    /// Returns the settings of a combination.
+    ///
     /// # Panics
     /// If the combination does not exist. All settings were checked when the plan was created.
     fn combination(&self, combination: u64) -> PlannedSettings {

@@ -16,18 +16,18 @@ use std::path::Path;
 pub enum Search {
     /// A planned run has the structure, or no search was requested.
     NotNeeded,
-    /// Some planned runs are not done yet.
+    /// Some planned runs are not complete yet.
     Waits,
-    /// The next run to execute: run *k* beyond the plan, from 1.
+    /// The next run to execute: run *k* beyond the plan, counted from 1.
     Next(Box<PlannedRun>, u32),
-    /// The run that has the structure: run *k* beyond the plan, from 1.
+    /// The run that has the structure: run *k* beyond the plan, counted from 1.
     Found(Box<PlannedRun>, u32),
-    /// This number of further runs, the maximum, are done, and none has the structure.
+    /// The maximum number of further runs, given here, is complete; none has the structure.
     NotFound(u32),
 }
 
 /// Searches the runs of a suite in its directory. Skips the first `after` runs beyond the plan,
-/// which are known not to have the structure. A damaged run counts as not done.
+/// which are known not to have the structure. A damaged run counts as incomplete.
 pub fn look(
     plan: &Plan,
     asked: &Resilience,
@@ -65,7 +65,7 @@ pub fn look(
     Search::NotFound(asked.further_runs)
 }
 
-/// Returns whether a structure dominates a run; `None` if the run is not done.
+/// Returns whether a structure dominates a run; `None` if the run is not complete.
 fn has(
     run: &PlannedRun,
     structure: Structure,

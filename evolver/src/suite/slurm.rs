@@ -1,7 +1,7 @@
 //! Slurm: a job array whose tasks are shares of a suite's runs.
 //!
 //! Tasks do not communicate; a task that is requeued or runs twice determines from the files which
-//! runs are done.
+//! runs are complete.
 
 use super::cluster::{Job, SCRIPT};
 use minimal_surprise_evolution::files::FileError;
@@ -41,7 +41,9 @@ pub enum SubmitError {
 
 fn at_most(shards: u32, array_max: Option<u32>) -> String {
     array_max.map_or(String::new(), |most| {
-        format!("\n--shards = {shards}: this cluster accepts from 1 to {most} (its MaxArraySize)")
+        format!(
+            "\n--shards = {shards}: this cluster accepts 1 to {most} ({most} is its MaxArraySize)"
+        )
     })
 }
 

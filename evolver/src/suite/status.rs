@@ -22,7 +22,7 @@ pub struct Hashes {
 }
 
 impl Hashes {
-    /// Reads the hashes of some runs, each once.
+    /// Reads the hash of each of these runs once.
     #[must_use]
     pub fn read(runs: Runs<'_>, suite: &Path, lines: bool, damaged: &mut DamagedRuns) -> Self {
         let mut hashes = Self {
@@ -35,7 +35,7 @@ impl Hashes {
         hashes
     }
 
-    /// Reads a run; returns whether it is done.
+    /// Reads a run; returns true if it is complete.
     fn add(&mut self, run: &PlannedRun, suite: &Path, damaged: &mut DamagedRuns) -> bool {
         let directory = run.directory(suite);
         let Some(finished) = damaged.read(&directory) else {
@@ -53,7 +53,7 @@ impl Hashes {
         true
     }
 
-    /// Returns the hash of the suite, the SHA-256 of all lines, if all runs are done.
+    /// Returns the hash of the suite, the SHA-256 of all lines, if all runs are complete.
     #[must_use]
     pub fn of_all(self, runs: Runs<'_>) -> Option<String> {
         (self.done == runs.number()).then(|| hex(&self.sum.finalize()))
@@ -80,9 +80,9 @@ pub struct Counts {
 pub struct Status {
     /// The experiments by name, with the counts of their settings.
     pub experiments: Vec<(String, Vec<Counts>)>,
-    /// Number of different runs that are done.
+    /// Number of different runs that are complete.
     pub done: u64,
-    /// The hash of all runs, if all are done.
+    /// The hash of all runs, if all are complete.
     pub hash: Option<String>,
     /// Damaged runs.
     pub damaged: DamagedRuns,

@@ -21,7 +21,7 @@ use std::time::Duration;
 /// A share of the runs: every *n*-th, starting at run *i*.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Index of the share, from 0.
+    /// Index of the share, counted from 0.
     pub index: u32,
     /// Number of shares.
     pub of: u32,
@@ -31,7 +31,7 @@ impl Shard {
     /// The share that contains all runs.
     pub const ALL: Self = Self { index: 0, of: 1 };
 
-    /// Parses a shard written as `i/n`, i from 0.
+    /// Parses a shard written as `i/n`, with i counted from 0.
     ///
     /// # Errors
     /// If the text is not a valid shard; the message describes the valid form.

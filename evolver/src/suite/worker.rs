@@ -1,5 +1,5 @@
-//! A worker: executes the runs of a suite that are not done, one at a time, and waits for runs that
-//! other processes execute.
+//! A worker: executes the runs of a suite that are not complete, one at a time, and waits for runs
+//! that other processes execute.
 
 use super::file::Resilience;
 use super::plan::{Plan, PlannedRun, RUNS, Runs};
@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Receiver of progress events.
 pub trait Watch {
     /// Receives the start or resumption of a run; `further` is the number of a run beyond the plan,
-    /// from 1.
+    /// counted from 1.
     fn begins(&self, run: &PlannedRun, further: Option<u32>);
 
     /// Receives the number of completed generations of a run.
@@ -32,12 +32,12 @@ pub trait Watch {
     fn waits(&self, run: &PlannedRun, directory: &Path, holder: Option<&Holder>);
 }
 
-/// The runs that are still to be done, determined from their files.
+/// The runs that are still to be executed, determined from their files.
 #[derive(Clone, Debug)]
 pub struct ToDo {
-    /// Whether each run is to be done.
+    /// For each run, true if it is to be executed.
     each: Vec<bool>,
-    /// Number of runs to be done.
+    /// Number of runs to be executed.
     pub number: u64,
     /// Number of robot-steps of these runs.
     pub robot_steps: u64,
@@ -45,7 +45,7 @@ pub struct ToDo {
     pub needs: NeedsOfRuns,
 }
 
-/// The reason why the runs to be done are unknown or cannot be started.
+/// The reason why the runs to be executed are unknown or cannot be started.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ToDoError {
@@ -58,7 +58,7 @@ pub enum ToDoError {
 }
 
 impl ToDo {
-    /// Determines the runs to be done from the files; damaged runs are not among them.
+    /// Determines the runs to be executed from the files; damaged runs are not among them.
     ///
     /// # Errors
     /// [`ToDoError`] if the folder cannot be read or the disk is much too small. The disk is
@@ -108,9 +108,9 @@ impl ToDo {
 /// Result of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// All work that could be done is done.
+    /// All possible work is complete.
     Whole,
-    /// The work was asked to stop.
+    /// A stop was requested.
     Interrupted,
 }
 
@@ -122,7 +122,7 @@ pub struct Worker<'a> {
     stop: &'a AtomicBool,
     /// Damaged runs.
     pub damaged: DamagedRuns,
-    /// Whether any work was done.
+    /// True if any work was done.
     pub begun: bool,
 }
 
@@ -188,7 +188,7 @@ impl<'a> Worker<'a> {
         Ok(Ended::Whole)
     }
 
-    /// Executes the runs to be done, and waits for runs that other processes execute.
+    /// Executes these runs, and waits for runs that other processes execute.
     ///
     /// # Errors
     /// [`RunDirError`] if an error affects more than a single run.

@@ -2,9 +2,9 @@
 //! `budget.toml` and the maximum value measured.
 //!
 //! Runs under QEMU with `-icount`. The values depend on the compiler, so the expected
-//! output is not stored; the test `budget` compares them with `budget.toml`.
+//! output is not stored; the `budget` test compares them with `budget.toml`.
 //!
-//! Uses `unsafe` for assembler that starts the clock before any other code.
+//! Uses `unsafe` for assembly that starts the clock before any other code.
 #![no_std]
 #![no_main]
 #![allow(unsafe_code)]
@@ -28,7 +28,7 @@ use minimal_surprise_slots::{Buffer, InUse, Slots};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// Number of sets of inputs for which the instructions of the activations are counted.
+/// Number of input sets for which the activation instructions are counted.
 const INPUT_SETS: u32 = 1000;
 /// Number of steps of each genome that are counted.
 const STEPS_PER_GENOME: u32 = 100;

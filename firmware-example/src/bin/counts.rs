@@ -16,7 +16,7 @@ use minimal_surprise_controller::{Controller, Decision, SensorBits, State, Topol
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// Number of sets of inputs for which the instructions of the activations are counted.
+/// Number of input sets for which the activation instructions are counted.
 const INPUT_SETS: u32 = 1000;
 
 /// Number of steps of each genome that are counted.

@@ -1,5 +1,5 @@
 //! Turns the wheels (lights on this board) and triggers the fault named on QEMU's command line. The
-//! test `faults` observes the wheels from outside the emulator.
+//! `faults` test observes the wheels from outside the emulator.
 #![no_std]
 #![no_main]
 

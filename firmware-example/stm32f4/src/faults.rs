@@ -1,6 +1,6 @@
 //! Functions that stop the wheels in every fault.
 //!
-//! Uses `unsafe` because the wheels' registers are addresses.
+//! Uses `unsafe` to access the wheels' registers by address.
 #![allow(unsafe_code)]
 
 use core::panic::PanicInfo;

@@ -1,5 +1,5 @@
-//! A replay as one self-contained page: it opens as a file, without a network, is controlled by
-//! mouse and keyboard, and verifies the states that it shows.
+//! A replay as one self-contained page: it opens from a local file, without network access, is
+//! controlled by mouse and keyboard, and verifies the states that it shows.
 //!
 //! The page receives its parameters as JSON and the states packed by [`encoding`]. The page's
 //! script follows the rules of [`super::scene`].

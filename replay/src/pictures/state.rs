@@ -1,5 +1,5 @@
-//! Pictures of one swarm, or two side by side: every robot is an arrow in its cell, with the marked
-//! cells.
+//! Pictures of one swarm, or two side by side: every robot is drawn as an arrow in its cell; marked
+//! cells are drawn too.
 
 use super::drawing::{Anchor, Drawing, Size, Stroke, line};
 use super::legend::Legend;
@@ -243,7 +243,7 @@ fn panels(
     Ok(drawing)
 }
 
-/// Draws a swarm from the north-west corner of its grid.
+/// Draws a swarm; the north-west corner of its grid is at (`west`, `north`).
 pub(super) fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f64), side: f64) {
     let theme = drawing.theme;
     let hair = drawing.size.hair();

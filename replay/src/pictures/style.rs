@@ -19,7 +19,7 @@ pub struct Style {
     pub robot: Option<usize>,
 }
 
-/// Error: a picture could not be made.
+/// Error: a picture could not be created.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PictureError {
@@ -44,7 +44,7 @@ pub enum PictureError {
         "a trajectory has poses only; give a run or a genome to show what robots sense and predict"
     )]
     NoController,
-    /// The recording was not made from a run directory, so no evolution is known.
+    /// The recording does not come from a run directory, so no evolution is known.
     #[error("only a run directory records how fitness evolved")]
     NoEvolution,
     /// The swarm was not damaged.

@@ -79,8 +79,8 @@ impl Plane {
         self.bits[word] & mask != 0
     }
 
-    /// Returns the cells `along` − 2 to `along` + 2 of the lines before, at and after `line`, five
-    /// bits each.
+    /// Returns the cells `along` − 2 to `along` + 2 of `line` and of the lines before and after it,
+    /// five bits per line.
     #[inline]
     fn window(&self, line: u32, along: u32) -> u16 {
         let mut window = 0;
@@ -93,7 +93,7 @@ impl Plane {
         window
     }
 
-    /// Copies the cells across the edges to the border.
+    /// Fills the border with the cells on the other side of each edge.
     fn close_edges(&mut self) {
         let words_per_line = self.words_per_line;
         let lines = self.lines as usize;

@@ -59,8 +59,8 @@ impl HiddenSum {
     }
 }
 
-/// Returns the window bits that a robot predicts *not* occupied before its first step. In this
-/// form, a predicted bit matches if it differs from the next reading.
+/// Returns the window bits that a robot predicts to be *empty* before its first step. In this form,
+/// a predicted bit matches if it differs from the next reading.
 pub(super) fn expected_empty_at_start(topology: Topology, order: &WindowOrder) -> u16 {
     order.sensors() & !order.window(topology.fixed().bits())
 }
@@ -70,7 +70,7 @@ pub(super) fn expected_empty_at_start(topology: Topology, order: &WindowOrder) -
 pub(super) struct PredictionWeights {
     /// Window bits that are sensors.
     pub(super) sensors: u16,
-    /// Window bits predicted not occupied before the first step.
+    /// Window bits predicted to be empty before the first step.
     pub(super) expected_empty_at_start: u16,
     /// Number of hidden neurons in use.
     pub(super) hidden: usize,

@@ -11,11 +11,11 @@ pub const PATH_VARIABLE: &str = "MINIMAL_SURPRISE_PATH";
 pub enum EnginePath {
     /// Instructions that every processor has.
     Portable,
-    /// AVX2: predictions of 16 robots at once.
+    /// AVX2: predicts for 16 robots at once.
     #[cfg(target_arch = "x86_64")]
     Avx2(x86::Avx2),
-    /// AVX-512 with its additions up to Ice Lake and Zen 4: predictions of 32 robots at once,
-    /// sensing and deciding of 16 robots at once.
+    /// AVX-512 with its additions up to Ice Lake and Zen 4: predicts for 32 robots at once, senses
+    /// and decides for 16.
     #[cfg(target_arch = "x86_64")]
     Avx512(x86::Avx512),
 }

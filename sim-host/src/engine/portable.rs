@@ -100,7 +100,7 @@ impl Network {
         }
     }
 
-    /// Returns the window bits that the activations predict not occupied.
+    /// Returns the window bits that the activations predict to be empty.
     #[inline]
     fn expected_empty(&self, hidden: &[i16; WIDTH]) -> u16 {
         let mut expected_empty = 0;

@@ -2,7 +2,7 @@
 //!
 //! If the same block of inputs repeats, the hidden activations of a robot soon become the same
 //! before and after a block. As long as the inputs do not change after that, every block has as
-//! many matching bits as the last one. Each lane has its own position in the recording of its
+//! many matching bits as the previous one. Each lane has its own position in the recording of its
 //! robot, skips independently, and takes the next robot when its recording is complete.
 
 use super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches};

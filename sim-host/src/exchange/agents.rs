@@ -34,7 +34,7 @@ const ROBOT: &str = "<x>, <y>, <start x>, <start y>, <heading x>, <heading y>, \
 /// Parses the text of an `agents` file: one or more generations, in order.
 ///
 /// # Errors
-/// [`ExchangeError`] if a line is invalid; contains the number of the first one.
+/// [`ExchangeError`] if a line is invalid; it contains the number of the first invalid line.
 pub fn read_agents(text: &str) -> Result<Vec<AgentsOfGeneration>, ExchangeError> {
     let mut lines = Lines::of(text);
     let mut generations: Vec<AgentsOfGeneration> = Vec::new();

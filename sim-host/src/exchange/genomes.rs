@@ -14,7 +14,7 @@ use minimal_surprise_controller::{Genome, Prediction, Topology};
 /// Rows of one generation's network, as in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GenomeRows {
-    /// Number of the first row's line, from 1; the other rows follow it.
+    /// Line number of the first row, counted from 1; the other rows follow it.
     pub line: usize,
     /// The rows of the input, hidden and output neurons, including the padding.
     pub rows: [Vec<f64>; 3],
@@ -26,7 +26,7 @@ const ROWS: [&str; 3] = ["input row", "hidden row", "output row"];
 /// more generations, starting with generation 0.
 ///
 /// # Errors
-/// [`ExchangeError`] if a line is invalid; contains the number of the first one.
+/// [`ExchangeError`] if a line is invalid; it contains the number of the first invalid line.
 pub fn read_genomes(text: &str) -> Result<Vec<GenomeRows>, ExchangeError> {
     generations(text).map(|rows| rows?.numbers()).collect()
 }
@@ -82,7 +82,7 @@ impl RowsOfText<'_> {
     /// Parses the numbers in the rows.
     ///
     /// # Errors
-    /// [`ExchangeError`] if a line is invalid; contains the number of the first one.
+    /// [`ExchangeError`] if a line is invalid; it contains the number of the first invalid line.
     pub fn numbers(&self) -> Result<GenomeRows, ExchangeError> {
         let mut rows = [const { Vec::new() }; 3];
         for ((line, text), row) in (self.line..).zip(self.rows).zip(&mut rows) {
@@ -123,9 +123,9 @@ impl core::fmt::Display for NetworkName {
 pub struct SaturatedWeight {
     /// The network whose file contains the weight.
     pub network: NetworkName,
-    /// Number of the weight's line, from 1.
+    /// Line number of the weight, counted from 1.
     pub line: usize,
-    /// Position of the weight in the line, from 1.
+    /// Position of the weight in the line, counted from 1.
     pub column: usize,
     /// Index of the weight in the genome.
     pub index: usize,
@@ -158,9 +158,9 @@ pub enum ImportError {
     RowLength {
         /// The network whose file contains the row.
         network: NetworkName,
-        /// Number of the row's line, from 1.
+        /// Line number of the row, counted from 1.
         line: usize,
-        /// Number of numbers in the row.
+        /// Number of values in the row.
         found: usize,
         /// Valid lengths of the row.
         expected: Vec<usize>,

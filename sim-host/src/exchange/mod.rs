@@ -30,7 +30,7 @@ use core::str::FromStr;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("line {line}: {problem}")]
 pub struct ExchangeError {
-    /// Number of the line, from 1.
+    /// Line number, counted from 1.
     pub line: usize,
     /// The problem in the line.
     pub problem: Problem,
@@ -256,8 +256,8 @@ fn pose(line: usize, grid: Grid, at: (i64, i64), ahead: (i64, i64)) -> Result<Po
     })
 }
 
-/// Checks that no two robots share a cell. Robot 0 is on line `first`, the others on the next
-/// lines.
+/// Checks that no two robots share a cell. Robot 0 is on line `first`, the others on the lines that
+/// follow.
 fn no_overlap(grid: Grid, poses: &[Pose], first: usize) -> Result<(), ExchangeError> {
     check_poses(grid, poses).map_err(|error| match error {
         WorldError::Overlap { robot, other, x, y } => Problem::Overlap {

@@ -70,7 +70,7 @@ impl Trajectory {
     /// Parses the text of an `agent_trajectory` file.
     ///
     /// # Errors
-    /// [`ExchangeError`] if a line is invalid; contains the number of the first one.
+    /// [`ExchangeError`] if a line is invalid; it contains the number of the first invalid line.
     pub fn read(text: &str) -> Result<Self, ExchangeError> {
         let mut lines = Lines::of(text);
         let (_, [generation]) = header(&mut lines, "Gen", "Gen: <generation>")?;

@@ -33,7 +33,7 @@ pub struct Clusters {
 }
 
 impl Clusters {
-    /// Returns the robots of each cluster, ascending. A robot may be in several clusters.
+    /// Returns the robots of each cluster, in ascending order. A robot may be in several clusters.
     #[must_use]
     pub fn clusters(&self) -> &[Vec<u32>] {
         &self.clusters
@@ -46,7 +46,7 @@ impl Clusters {
         &self.groups
     }
 
-    /// Returns the robots that belong to at least one cluster, ascending.
+    /// Returns the robots that belong to at least one cluster, in ascending order.
     #[must_use]
     pub fn robots(&self) -> &[u32] {
         &self.robots

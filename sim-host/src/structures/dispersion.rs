@@ -1,8 +1,8 @@
 //! Dispersion: squares, triangular lattices, and robots that are dispersed at random.
 //!
 //! Headings do not matter. Patterns are matched on the torus: on a grid smaller than a pattern,
-//! several positions of the pattern are the same cell, which must then satisfy all of them. On a
-//! side of three cells, no pattern is possible.
+//! several positions of the pattern fall on the same cell, which must then satisfy all of them. If
+//! a side of the grid is three cells long, no pattern is possible.
 
 use super::field::{Field, MOORE};
 

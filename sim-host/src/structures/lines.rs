@@ -1,7 +1,7 @@
 //! Lines: robots in a row that hold each other in place.
 //!
 //! Along an axis, take a maximal run of neighbouring robots whose headings are on that axis, and
-//! remove the robots that point outward from both ends of the run. The rest is a line if it has at
+//! remove the outward-pointing robots at both ends of the run. The rest is a line if it has at
 //! least [`LENGTH_MIN`] robots and no two adjacent cells beside it, on the same side, are both
 //! occupied. A run around the whole torus needs no ends (paper, Sec. 2.2, rules 1 to 3).
 //!
@@ -195,7 +195,7 @@ fn follow(field: &Field, axis: Axis, first: u32, seen: &mut [bool], run: &mut Ve
     }
 }
 
-/// Returns the run without the robots that point outward from its ends.
+/// Returns the run without the outward-pointing robots at its ends.
 fn without_outward<'a>(field: &Field, axis: Axis, run: &'a [u32]) -> &'a [u32] {
     let points = |heading| move |&robot: &u32| field.heading(robot) == heading;
     let first = run.iter().position(points(axis.forward()));

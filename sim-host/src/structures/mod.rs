@@ -256,7 +256,7 @@ impl Structures {
         memberships
     }
 
-    /// Iterates over the indices of the robots that belong to a structure, ascending.
+    /// Iterates over the indices of the robots that belong to a structure, in ascending order.
     pub fn robots_in(&self, structure: Structure) -> impl Iterator<Item = u32> {
         (0..self.swarm_size).filter(move |&robot| self.contains(structure, robot))
     }

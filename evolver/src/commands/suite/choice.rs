@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Name of the directory of the paper's suite.
 const BUILT_IN: &str = "paper";
 
-/// Which runs.
+/// Selection of runs.
 #[derive(Debug, Args)]
 pub struct Choice {
     /// Only this experiment.
@@ -38,7 +38,7 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// Returns whether these are all runs of the suite, and no others.
+    /// Returns true if the choice is exactly all runs of the suite.
     pub fn is_whole(&self) -> bool {
         self.flags().is_empty()
     }
@@ -68,7 +68,7 @@ impl Choice {
 pub(super) struct Source {
     /// The suite.
     pub suite: Suite,
-    /// Whether it is the built-in one.
+    /// True if the suite is built in.
     pub built_in: bool,
     /// Text of the suite's file.
     pub text: String,
@@ -76,7 +76,7 @@ pub(super) struct Source {
     pub called: String,
 }
 
-/// The runs chosen from a suite, and where they are.
+/// The runs chosen from a suite, and their location.
 pub(super) struct Chosen<'a> {
     /// The suite.
     pub source: &'a Source,
@@ -106,12 +106,12 @@ impl<'a> Chosen<'a> {
     pub(super) fn searches(&self) -> &'a [Resilience] {
         match self.choice.runs {
             None => &self.source.suite.resiliences,
-            // With a different number of runs it is a different experiment.
+            // With a different number of runs, the experiment is different.
             Some(_) => &[],
         }
     }
 
-    /// Returns the command that does the runs and searches.
+    /// Returns the command that executes the runs and searches.
     pub(super) fn command(&self) -> String {
         let mut words = vec![self.source.called.clone(), "run".to_owned()];
         let flags = self.choice.flags();
@@ -142,7 +142,7 @@ fn directory(source: &Source, choice: &Choice) -> PathBuf {
     choice.out.clone().unwrap_or_else(|| {
         let runs = Path::new("runs");
         let taken = if source.built_in { "" } else { BUILT_IN };
-        // A directory that an earlier version named so is continued.
+        // Keeps using a directory that an earlier version created with this name.
         let mut there = fs::read_dir(runs).into_iter().flatten().flatten();
         if suite.name != taken && there.any(|entry| entry.file_name() == *suite.name) {
             return runs.join(&suite.name);

@@ -29,46 +29,47 @@ pub struct SuiteArgs {
     verb: Verb,
 }
 
-/// What to do with a suite.
+/// Actions on a suite.
 #[derive(Debug, Subcommand)]
 pub enum Verb {
-    /// List the runs, without doing any.
+    /// List the runs without executing any.
     Plan(Choice),
-    /// Do the runs that are not done; may be interrupted at any moment and called again.
+    /// Execute the runs that are not complete; can be interrupted at any moment and called again.
     Run {
-        /// Which runs.
+        /// Selection of runs.
         #[command(flatten)]
         choice: Choice,
-        /// How to work.
+        /// Options for the work.
         #[command(flatten)]
         options: RunOptions,
     },
-    /// Show how many runs are done; once all are, one hash for all.
+    /// Show the number of complete runs; once all are complete, also one hash for all.
     Status(Choice),
-    /// Write the report: tables, figures and findings, from the runs that are done.
+    /// Write the report: tables, figures and findings, from the complete runs.
     Report {
-        /// Which runs.
+        /// Selection of runs.
         #[command(flatten)]
         choice: Choice,
-        /// Where to write it.
+        /// Location of the report.
         #[command(flatten)]
         options: report::ReportOptions,
     },
     /// Submit the runs to a cluster.
     Submit {
-        /// Which runs.
+        /// Selection of runs.
         #[command(flatten)]
         choice: Choice,
-        /// How to submit them.
+        /// Options for the submission.
         #[command(flatten)]
         options: submit::SubmitOptions,
     },
 }
 
-/// `evolver paper …`
+/// Runs `evolver paper …`.
 ///
 /// # Errors
-/// [`BadInput`] before anything is written; other errors leave runs that can be resumed.
+/// [`BadInput`] if an argument or the suite is invalid; nothing has been written then. After other
+/// errors, unfinished runs can be resumed.
 pub fn paper(verb: &Verb) -> anyhow::Result<Exit> {
     let paper = Source {
         suite: Suite::paper().map_err(BadInput::new)?,
@@ -79,18 +80,18 @@ pub fn paper(verb: &Verb) -> anyhow::Result<Exit> {
     act(&paper, verb)
 }
 
-/// `evolver suite FILE …`
+/// Runs `evolver suite FILE …`.
 ///
 /// # Errors
-/// As [`paper`].
+/// See [`paper`].
 pub fn suite(arguments: &SuiteArgs) -> anyhow::Result<Exit> {
     act(&read(&arguments.file)?, &arguments.verb)
 }
 
-/// `evolver run-task`
+/// Runs `evolver run-task …`.
 ///
 /// # Errors
-/// As [`paper`].
+/// See [`paper`].
 pub fn run_task(arguments: &TaskArgs) -> anyhow::Result<Exit> {
     let share = Share::parse(&arguments.shard)?;
     let source = read(&arguments.suite)?;

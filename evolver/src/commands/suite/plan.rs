@@ -4,7 +4,8 @@ use super::choice::Chosen;
 use crate::exit::Exit;
 use crate::suite::Resilience;
 
-/// Prints the plan: settings with their numbers of runs, re-evaluations, damage and the amount of work.
+/// Prints the plan: settings with their numbers of runs, re-evaluations, damage and the amount of
+/// work.
 pub(super) fn print(chosen: &Chosen) -> Exit {
     let (plan, suite, searches) = (&chosen.plan, &chosen.source.suite, chosen.searches());
     for experiment in &plan.experiments {
@@ -34,7 +35,7 @@ pub(super) fn print(chosen: &Chosen) -> Exit {
         );
         if damage.further_runs > 0 && searches.contains(damage) {
             show_line!(
-                "  if no run of {of} has a {structure}: up to {} runs more",
+                "  if no run of {of} has a {structure}: up to {} more runs",
                 damage.further_runs
             );
         }

@@ -16,14 +16,14 @@ use minimal_surprise_evolution::text::terminal_path;
 use minimal_surprise_replay::gallery;
 use std::path::{Path, PathBuf};
 
-/// Where the report is written.
+/// Location and extent of the report.
 #[derive(Debug, Args)]
 pub struct ReportOptions {
-    /// Where it is written [default: report/ in the directory of the suite].
+    /// Directory of the report [default: report/ in the directory of the suite].
     #[arg(long, value_name = "DIR")]
     to: Option<PathBuf>,
-    /// Also write a page with every run's final state, from which its replay opens: gallery/ in
-    /// the report.
+    /// Also write a page with every run's final state, linked to its replay: gallery/ in the
+    /// report.
     #[arg(long)]
     gallery: bool,
 }
@@ -31,8 +31,8 @@ pub struct ReportOptions {
 /// Writes the report.
 ///
 /// # Errors
-/// [`BadInput`] if the directory holds something other than a report or no run is done; otherwise
-/// if a run cannot be read or a file cannot be written.
+/// [`BadInput`] if the directory holds something other than a report or no run is complete;
+/// otherwise if a run cannot be read or a file cannot be written.
 pub(super) fn write(chosen: &Chosen, options: &ReportOptions) -> anyhow::Result<Exit> {
     let out = options
         .to
@@ -40,8 +40,8 @@ pub(super) fn write(chosen: &Chosen, options: &ReportOptions) -> anyhow::Result<
         .unwrap_or_else(|| chosen.directory.join("report"));
     if !report::may_be_written(&out).map_err(unusable)? {
         return Err(BadInput::new(format!(
-            "{}: it is not marked as a report that may be replaced (an earlier version set \
-             no mark); name a new directory with --to",
+            "{}: not marked as a report that may be replaced (earlier versions set no mark); \
+             choose a new directory with --to",
             out.display()
         ))
         .into());
@@ -57,8 +57,8 @@ pub(super) fn write(chosen: &Chosen, options: &ReportOptions) -> anyhow::Result<
     }
     if finished.is_empty() {
         return Err(BadInput::new(format!(
-            "{}: no run of this suite is done there; --out names the directory that its \
-             runs are in",
+            "{}: contains no complete run of this suite; set the directory of its runs with \
+             --out",
             chosen.directory.display()
         ))
         .into());

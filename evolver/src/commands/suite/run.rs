@@ -1,4 +1,4 @@
-//! `run`, and the tasks of a cluster: do the runs that are not done.
+//! `run`, and the tasks of a cluster: execute the runs that are not complete.
 
 use super::choice::{Choice, Chosen};
 use crate::commands::BadInput;
@@ -24,13 +24,13 @@ use minimal_surprise_sim::EnginePath;
 use std::fs;
 use std::path::PathBuf;
 
-/// How the runs are done.
+/// Options for executing the runs.
 #[derive(Debug, Args)]
 pub struct RunOptions {
     /// Threads; no result depends on them [default: one per core].
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     threads: Option<String>,
-    /// How progress is shown.
+    /// Display of the progress.
     #[arg(long, value_enum, default_value_t)]
     progress: ProgressMode,
 }
@@ -38,7 +38,7 @@ pub struct RunOptions {
 /// Arguments of one cluster or GNU parallel task.
 #[derive(Debug, Args)]
 pub struct TaskArgs {
-    /// Share of the runs: i/n, i from 0.
+    /// Share of the runs: i/n, with i counted from 0.
     #[arg(long, value_name = "i/n")]
     pub(super) shard: String,
     /// The suite's TOML file.
@@ -50,7 +50,7 @@ pub struct TaskArgs {
     pub(super) options: RunOptions,
 }
 
-/// The part of the chosen runs to do.
+/// The share of the chosen runs that this process executes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Share {
     /// All runs, then the searches beyond the plan.
@@ -76,10 +76,11 @@ impl Share {
     }
 }
 
-/// Does a share of the chosen runs.
+/// Executes a share of the chosen runs.
 ///
 /// # Errors
-/// [`BadInput`] before anything is written; other errors leave runs that can be resumed.
+/// [`BadInput`] if an argument is invalid; nothing has been written then. After other errors,
+/// unfinished runs can be resumed.
 pub(super) fn run(chosen: &Chosen, share: Share, options: &RunOptions) -> anyhow::Result<Exit> {
     let shard = share.shard();
     let runs = shard.of_plan(&chosen.plan);
@@ -93,7 +94,7 @@ pub(super) fn run(chosen: &Chosen, share: Share, options: &RunOptions) -> anyhow
     finish(chosen, share, options, runs, damaged)
 }
 
-/// Does the runs and searches; returns how the work ended, and the damaged runs.
+/// Executes the runs and searches; returns the outcome of the work and the damaged runs.
 fn work(
     chosen: &Chosen,
     share: Share,
@@ -106,7 +107,7 @@ fn work(
         Share::One(_) => &[],
     };
     let threads = threads_flag(&options.threads)?;
-    // As in `evolve`, an unknown engine is an error before anything is done.
+    // As in `evolve`, an unknown engine is an error before any run is executed.
     EnginePath::from_environment().map_err(BadInput::new)?;
     let mut damaged = DamagedRuns::default();
     let threads_or_cores = limits::threads(threads);
@@ -139,7 +140,7 @@ fn work(
     Ok((ended, worker.damaged))
 }
 
-/// Writes the hashes of finished runs and prints how many runs are done.
+/// Writes the hashes of finished runs and prints the number of complete runs.
 fn finish(
     chosen: &Chosen,
     share: Share,
@@ -185,13 +186,13 @@ fn finish(
             show_line!("hash {hash}");
         }
         if let Some(command) = search_by {
-            show_line!("for a structure that no run formed, once all are done: {command}");
+            show_line!("to find a structure that no run formed, once all are done: {command}");
         }
     }
     if !all_done && damaged.is_empty() {
         let gone = runs.number() - done;
         return Err(Unfinished(format!(
-            "{gone} runs were removed while others were done; continue with: the same command"
+            "{gone} runs were removed while others were executed; continue with: the same command"
         ))
         .into());
     }

@@ -1,4 +1,4 @@
-//! `status`: counts the runs that are done.
+//! `status`: counts the complete runs.
 
 use super::choice::Chosen;
 use crate::commands::errors::name_damaged;
@@ -10,7 +10,7 @@ use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_evolution::finished_run::ReadRunError;
 use std::path::Path;
 
-/// Prints how many runs are done, and how the searches stand.
+/// Prints the number of complete runs and the state of the searches.
 ///
 /// # Errors
 /// If a directory cannot be read; a damaged run is only reported.
@@ -20,7 +20,7 @@ pub(super) fn print(chosen: &Chosen) -> anyhow::Result<Exit> {
     Ok(name_damaged(&damaged, Some(&chosen.command())))
 }
 
-/// Prints how many runs are done, and returns the damaged ones.
+/// Prints the numbers of complete runs, and returns the damaged ones.
 fn print_runs(plan: &Plan, directory: &Path) -> Result<DamagedRuns, ReadRunError> {
     let status = Status::read(plan, directory)?;
     for (experiment, settings) in &status.experiments {
@@ -54,7 +54,7 @@ fn print_searches(chosen: &Chosen, damaged: &mut DamagedRuns) {
         let said = match look(&chosen.plan, asked, &chosen.directory, 0, damaged) {
             Search::NotNeeded => continue,
             Search::Waits => format!(
-                "waits for the runs that it searches through; then, if none has a {}, continue with: \
+                "waiting for the planned runs; then, if none of them has a {}, continue with: \
                  {command}",
                 asked.structure
             ),

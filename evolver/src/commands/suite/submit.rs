@@ -18,7 +18,7 @@ pub enum ClusterEngine {
     Slurm,
 }
 
-/// How the runs are submitted.
+/// Options for submitting the runs.
 #[derive(Debug, Args)]
 pub struct SubmitOptions {
     /// The engine.
@@ -32,10 +32,10 @@ pub struct SubmitOptions {
         allow_hyphen_values = true
     )]
     shards: String,
-    /// Maximum number of tasks at once.
+    /// Maximum number of tasks that run at the same time.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     at_once: Option<String>,
-    /// Only show what would be submitted.
+    /// Show the job script without submitting it.
     #[arg(long)]
     dry_run: bool,
 }
@@ -62,7 +62,7 @@ pub(super) fn submit(chosen: &Chosen, options: &SubmitOptions) -> anyhow::Result
         flags: chosen.choice.flags(),
     };
     if !options.dry_run {
-        // Memory is that of the machines that the tasks run on.
+        // Checks only the disk: the tasks use the memory of other machines.
         let to_do = ToDo::read(
             chosen.plan.runs(),
             &chosen.directory,

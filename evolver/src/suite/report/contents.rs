@@ -70,13 +70,13 @@ pub struct SuiteReport {
     pub differences: Vec<String>,
     /// Notes on the differences: the lines of `looked-into.md` in the report's folder.
     pub looked_into: Vec<String>,
-    /// Whether the report's folder contains a gallery of the runs.
+    /// True if the report's folder contains a gallery of the runs.
     pub has_gallery: bool,
-    /// Whether experiments share runs.
+    /// True if experiments share runs.
     pub shares_runs: bool,
     /// Number of tests in the tables that could find a difference, each counted once.
     pub tests: usize,
-    /// Whether the tables include numbers of the paper.
+    /// True if the tables include numbers from the paper.
     pub has_paper: bool,
     /// The command line prefix that selects this suite.
     pub called: String,

@@ -14,19 +14,19 @@ use serde::Serialize;
 /// A figure.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// Name of its files.
+    /// Name of the figure's files.
     pub id: String,
-    /// Its number in the paper, if it is one of the paper's.
+    /// Number of the figure in the paper; `None` if it is not in the paper.
     pub number: Option<u32>,
-    /// What it shows.
+    /// Title of the figure.
     pub title: String,
-    /// The picture.
+    /// The picture as SVG.
     pub svg: String,
-    /// Its data.
+    /// The data of the figure, as CSV.
     pub csv: String,
 }
 
-/// What is drawn of an experiment in the paper.
+/// The final states of an experiment that a figure of the paper shows.
 struct OfPaper {
     figure: u32,
     experiment: &'static str,
@@ -34,7 +34,7 @@ struct OfPaper {
     by: By,
 }
 
-/// What final states are shown one of each of.
+/// Property by which final states are chosen: one state per value is shown.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum By {
     Structure,
@@ -180,10 +180,10 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
     Ok(figures)
 }
 
-/// Marks a run beyond the plan.
+/// Mark of a run beyond the plan.
 const BEYOND_PLAN: &str = "*";
 
-/// What a figure is called.
+/// The names of a figure.
 struct Name {
     id: String,
     number: Option<u32>,
@@ -191,7 +191,7 @@ struct Name {
 }
 
 impl Name {
-    /// With what the mark means, if it is there.
+    /// Adds the meaning of the mark to the title if the figure contains the mark.
     fn explained(mut self, has_mark: bool) -> Self {
         if has_mark {
             self.title += &format!("; {BEYOND_PLAN} a run beyond the plan");
@@ -220,7 +220,8 @@ impl Name {
     }
 }
 
-/// The runs beyond the plan under a group's settings that have a structure that none of its own has.
+/// Returns runs beyond the plan with a group's settings, one for each structure that a damage
+/// experiment needs and no run of the group has.
 fn beyond_plan<'a>(
     gathered: &'a Gathered,
     group: &Group,
@@ -237,7 +238,8 @@ fn beyond_plan<'a>(
     found
 }
 
-/// The run of each structure (or way of lines) with the largest share in it, ties by seed.
+/// Returns, for each structure or line orientation, the run with the largest share in the
+/// structure; ties go to the lowest seed.
 fn one_of_each(group: &Group, by: By) -> Vec<(String, Structure, &GatheredRun)> {
     let best = |structure: Structure, is: &dyn Fn(&&GatheredRun) -> bool| {
         group.runs.iter().filter(is).reduce(|best, next| {
@@ -436,9 +438,9 @@ fn predictions(name: Name, groups: &[&Group], gathered: &Gathered) -> Result<Fig
 /// Runs whose values are shown together over time.
 struct Values {
     title: String,
-    /// Of each run, its values.
+    /// The values of each run.
     runs: Vec<Vec<f64>>,
-    /// Every *k*-th value is shown.
+    /// Interval *k*: every *k*-th value is shown.
     every: usize,
 }
 
@@ -503,7 +505,7 @@ struct BandRow<'a> {
     maximum: f64,
 }
 
-/// Medians with bands from quartile to quartile and from the least to the largest value.
+/// Draws medians with bands between the quartiles and between the minimum and the maximum.
 fn bands(
     name: Name,
     (x, y): (&'static str, &'static str),

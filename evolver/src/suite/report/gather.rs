@@ -92,7 +92,7 @@ pub struct Group {
     pub experiment: String,
     /// Label of the settings.
     pub label: String,
-    /// Whether the runs are beyond the plan.
+    /// True if the runs are beyond the plan.
     pub is_beyond_plan: bool,
     /// The settings, including the first seed.
     pub settings: Settings,
@@ -158,7 +158,7 @@ pub struct Reevaluated {
     pub experiment: String,
     /// Label of the settings.
     pub label: String,
-    /// Results of every genome, one per new start.
+    /// For each genome, one result per new start.
     pub genomes: Vec<Vec<NewStart>>,
     /// SHA-256 of all fitnesses and final poses, in order.
     pub hash: String,
@@ -179,7 +179,7 @@ impl Reevaluated {
 /// An area that was damaged.
 #[derive(Clone, Debug)]
 pub struct DamagedArea {
-    /// A, B, C, …
+    /// Name of the area: A, B, C, …
     pub name: char,
     /// The cells.
     pub rectangle: Rectangle,
@@ -256,7 +256,7 @@ pub struct Overall {
     pub hash: String,
     /// Number of areas, summed over all runs.
     pub areas: usize,
-    /// Number of areas after whose removal the share at the end was at least the share at the
+    /// Number of areas for which, after removal, the share at the end was at least the share at the
     /// start.
     pub removal_holds: usize,
     /// Number of such areas after repositioning, by the mean shares.
@@ -353,7 +353,7 @@ impl Gathered {
         })
     }
 
-    /// Returns the runs of an experiment with some settings, if they are in the plan.
+    /// Returns the runs of an experiment with these settings, if they are in the plan.
     #[must_use]
     pub fn group(&self, experiment: &str, label: &str) -> Option<&Group> {
         self.groups
@@ -369,7 +369,7 @@ impl Gathered {
         })
     }
 
-    /// Returns the directories of the planned runs that are done, in the suite's directory.
+    /// Returns the directories of the planned runs that are complete, in the suite's directory.
     #[must_use]
     pub fn directories(&self, suite: &Path) -> Vec<PathBuf> {
         let runs = self.groups.iter().flat_map(|group| &group.runs);

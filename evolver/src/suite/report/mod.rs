@@ -2,8 +2,8 @@
 //! intervals and tests.
 //!
 //! [`gather`] reads the finished runs and executes re-evaluations and damage experiments;
-//! [`tables`], [`figures`] and [`findings`] evaluate them with the numbers of [`paper`];
-//! [`contents`] combines the results, which [`mod@markdown`] and [`html`] write.
+//! [`tables`], [`figures`] and [`findings`] evaluate the runs and compare them with the numbers in
+//! [`paper`]; [`contents`] combines the results, which [`mod@markdown`] and [`html`] write.
 
 pub mod contents;
 pub mod damage_areas;

@@ -32,8 +32,10 @@ pub(super) fn csv_text(rows: &[impl Serialize]) -> String {
     for row in rows {
         table
             .serialize(row)
-            .expect("plain rows are written to memory");
+            .expect("writing plain rows to memory cannot fail");
     }
-    let bytes = table.into_inner().expect("memory needs no flushing");
+    let bytes = table
+        .into_inner()
+        .expect("flushing a buffer in memory cannot fail");
     String::from_utf8(bytes).expect("text stays text")
 }

@@ -1,4 +1,4 @@
-//! The program `with`, without its controller.
+//! The `with` program, without its controller.
 #![no_std]
 #![no_main]
 

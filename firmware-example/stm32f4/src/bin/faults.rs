@@ -1,9 +1,9 @@
-//! Turns the wheels and triggers the fault named on QEMU's command line. The test `faults` observes
+//! Turns the wheels and triggers the fault named on QEMU's command line. The `faults` test observes
 //! the wheels' registers from outside the emulator. Do not flash this program to a robot. QEMU
 //! emulates neither the clocks nor the timers of the chip, so it cannot run the rest of the
 //! firmware.
 //!
-//! Uses `unsafe` because a register is an address.
+//! Uses `unsafe` to access a register by address.
 #![no_std]
 #![no_main]
 #![allow(unsafe_code)]

@@ -1,5 +1,5 @@
 //! x86-64 vector paths. The only unsafe code of the crate is in this folder: intrinsics that use
-//! pointers, and calls of functions compiled for instructions that not every processor has. These
+//! pointers, and calls to functions compiled for instructions that some processors lack. These
 //! calls are in methods of [`Avx2`] and [`Avx512`], which can be constructed only after the
 //! instructions have been detected at run time.
 #![allow(unsafe_code)]

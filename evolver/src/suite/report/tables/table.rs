@@ -30,7 +30,7 @@ pub struct Value {
     pub test: Option<&'static str>,
     /// The test's p-value.
     pub p: Option<f64>,
-    /// Whether the test finds no significant difference.
+    /// True if the test finds no significant difference.
     pub compatible: Option<bool>,
     /// Number of decimals to print.
     #[serde(skip)]

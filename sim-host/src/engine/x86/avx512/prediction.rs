@@ -85,8 +85,8 @@ impl Network {
         matches: &mut Matches,
     ) -> u32 {
         let windows = windows_in_packed_order(&blocks.inputs);
-        // The two buffers alternate: one holds the last hidden activations, the other receives the
-        // next.
+        // The two buffers alternate: one holds the previous hidden activations, the other receives
+        // the next.
         let mut even = Hidden::<USED>::load(lanes);
         let mut odd = Hidden::<USED>::none();
         let at_start = _mm512_set1_epi16(self.expected_empty_at_start as i16);
@@ -121,9 +121,9 @@ impl Network {
     }
 
     /// Runs one step: computes the next hidden activations and returns the window bits that the
-    /// last activations predict not occupied, in packed order.
+    /// previous activations predict to be empty, in packed order.
     ///
-    /// Both results depend only on the last activations, so neither waits for the other.
+    /// Both results depend only on the previous activations, so neither waits for the other.
     #[target_feature(enable = "avx512f,avx512bw,avx512vbmi2,avx512vnni")]
     #[inline]
     fn step<const USED: usize>(
@@ -164,7 +164,7 @@ impl Network {
         }
     }
 
-    /// Computes the hidden sums of 16 robots from their windows and last activations.
+    /// Computes the hidden sums of 16 robots from their windows and previous activations.
     #[target_feature(enable = "avx512f,avx512vnni")]
     #[inline]
     fn hidden_sum(&self, neuron: usize, windows: [__m512i; 3], last: __m512i) -> __m512i {

@@ -1,4 +1,4 @@
-//! Sensing and deciding of 16 robots at once.
+//! Senses and decides for 16 robots at once.
 //!
 //! On boards whose lines are single words, all lines are kept in registers, and a permutation
 //! fetches each robot's lines; on wider boards, gathers fetch them. Then the three lines are
