@@ -512,7 +512,7 @@ fn a_line_unplugged_halfway_leaves_the_old_genome_in_use() {
     for done in 1..=6 {
         for (fault, words) in [
             (Fault::PulledAfter(done), "the line failed"),
-            (Fault::MuteAfter(done), "stopped answering"),
+            (Fault::MuteAfter(done), "stopped replying"),
         ] {
             // An erase has the longest time-out, so this case is tested only on request.
             if fault == Fault::MuteAfter(2) && !full::all_cases() {
@@ -543,7 +543,7 @@ fn a_line_unplugged_during_monitor_or_hil_is_reported() {
     assert_failed(&run, &["the line failed while the robot was stepping"]);
     let robot = with_the_old_genome(&evolver, Fault::MuteAfter(20));
     let run = evolver.run(&["hil", "old.genome", "--port", &robot.device.port]);
-    assert_failed(&run, &["the robot stopped answering while it was stepping"]);
+    assert_failed(&run, &["the robot stopped replying while it was stepping"]);
 
     let robot = with_the_old_genome(&evolver, Fault::None);
     let port = robot.device.port.clone();
@@ -704,10 +704,7 @@ fn wait_applies_only_to_the_first_answer() {
                 let started = Instant::now();
                 let run = evolver.run(&["flash", "new.genome", "--port", port, "--wait", wait]);
                 let waited = started.elapsed().as_secs_f64();
-                assert_failed(
-                    &run,
-                    &["the robot stopped answering while it was receiving"],
-                );
+                assert_failed(&run, &["the robot stopped replying while it was receiving"]);
                 // Five attempts of half a second.
                 assert!((2.5..20.0).contains(&waited), "{wait}: {waited}");
             });

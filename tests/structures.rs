@@ -13,7 +13,8 @@ use tests::structures::{Counts, State, states};
 
 type Cell = (u16, u16);
 
-/// Rules at the edge of the torus. Our rules: true, true. The scripts': false, false.
+/// Rules at the edge of the torus. Both fields are true for our rules and false for the scripts'
+/// rules.
 #[derive(Clone, Copy)]
 struct EdgeRules {
     /// Neighbours beside a line or pair are adjacent across the edge.

@@ -20,21 +20,21 @@ use minimal_surprise_sim::{Pose, Structure};
 use serde::{Deserialize, Serialize, Serializer};
 use serde_json::value::to_raw_value;
 
-/// Settings.
+/// Name of the file with the settings.
 pub const CONFIG: &str = "config.toml";
-/// Schema version, seed, program.
+/// Name of the file with the schema version, the seed and the program.
 pub const META: &str = "meta.json";
-/// One row per generation.
+/// Name of the table with one row per generation.
 pub const GENERATIONS: &str = "generations.csv";
-/// The last generation's best genome.
+/// Name of the file with the last generation's best genome.
 pub const BEST: &str = "best.genome";
-/// Start and end of the final run.
+/// Name of the file with the start and end of the final run.
 pub const FINAL: &str = "final.json";
-/// Time spent on the run.
+/// Name of the file with the time spent on the run.
 pub const TIME: &str = "time.json";
-/// Mark of a complete run, which contains the run's hash.
+/// Name of the file that marks a run as complete and contains the run's hash.
 pub const DONE: &str = "DONE";
-/// State from which an incomplete run is resumed.
+/// Name of the file with the state from which an incomplete run is resumed.
 pub const CHECKPOINT: &str = "checkpoint";
 
 /// Files required in a complete run, in addition to [`DONE`].

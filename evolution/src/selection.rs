@@ -21,7 +21,7 @@ impl Selection {
     /// Reads `roulette` or `tournament:K`.
     ///
     /// # Errors
-    /// A description of valid methods, if `text` is not one.
+    /// A description of the valid methods if `text` is invalid.
     pub fn parse(text: &str) -> Result<Self, String> {
         match text.split_once(':') {
             None if text == "roulette" => Ok(Self::Roulette),

@@ -132,7 +132,7 @@ pub fn identifier(text: &str) -> String {
 /// Checks an identifier for C and Rust.
 ///
 /// # Errors
-/// A description of valid identifiers, if `text` is not one.
+/// A description of valid identifiers if `text` is not a valid one.
 pub fn checked_identifier(text: &str) -> Result<&str, &'static str> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let is_keyword = KEYWORDS.split_whitespace().any(|keyword| keyword == text);

@@ -56,7 +56,7 @@ pub enum RequestError {
     #[error("the first request of a session must be to identify")]
     IdentifyFirst,
     /// The chunk has more than [`CHUNK_BYTES_MAX`] bytes.
-    #[error("a chunk of {found} bytes; at most {CHUNK_BYTES_MAX} fit a request")]
+    #[error("a chunk of {found} bytes; at most {CHUNK_BYTES_MAX} fit in a request")]
     ChunkTooLong {
         /// Size of the chunk, in bytes.
         found: usize,

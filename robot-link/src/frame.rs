@@ -17,7 +17,7 @@ pub const WIRE_BYTES_MAX: usize = FRAME_BYTES_MAX + 3;
 // One byte of overhead is enough for frames this short.
 const _: () = assert!(FRAME_BYTES_MAX < 254);
 
-/// Error for a message that does not fit a frame.
+/// Error: the message does not fit in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("a message of more than {PAYLOAD_BYTES_MAX} bytes")]

@@ -17,7 +17,9 @@ pub enum PlaceError {
         erase_size: usize,
     },
     /// The second slot does not fit into the flash.
-    #[error("two slots of {slot_bytes} bytes at {offset} do not fit a flash of {capacity} bytes")]
+    #[error(
+        "two slots of {slot_bytes} bytes at {offset} do not fit in a flash of {capacity} bytes"
+    )]
     OutOfBounds {
         /// The byte address requested.
         offset: u32,

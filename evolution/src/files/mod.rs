@@ -118,7 +118,8 @@ pub enum TooLarge {
         /// The size limit.
         most: u64,
     },
-    /// The file has no known size, such as a pipe, and does not end within the limit.
+    /// The file has no known size, for example because it is a pipe, and does not end within the
+    /// limit.
     #[error("it does not end within {most} bytes; no more are read")]
     Endless {
         /// The size limit.

@@ -15,7 +15,7 @@ pub(super) const PROBABILITY: &str = "expected a probability from 0 to 1";
 /// Parses a probability.
 ///
 /// # Errors
-/// A description of valid probabilities, if `text` is not one.
+/// A description of the valid probabilities if `text` is invalid.
 pub fn probability(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
@@ -26,7 +26,7 @@ pub fn probability(text: &str) -> Result<f64, String> {
 /// Parses a whole number from 1 to `most`.
 ///
 /// # Errors
-/// A description of valid numbers, if `text` is not one.
+/// A description of the valid numbers if `text` is invalid.
 pub fn count(text: &str, most: u32) -> Result<u32, String> {
     match text.parse() {
         Ok(value) if (1..=most).contains(&value) => Ok(value),
@@ -37,7 +37,7 @@ pub fn count(text: &str, most: u32) -> Result<u32, String> {
 /// Parses a grid written as `15x15`.
 ///
 /// # Errors
-/// A description of valid grids, if `text` is not one.
+/// A description of the valid grids if `text` is invalid.
 pub fn grid(text: &str) -> Result<Grid, String> {
     let sides = text
         .split_once('x')
@@ -50,7 +50,7 @@ pub fn grid(text: &str) -> Result<Grid, String> {
 /// Parses a seed.
 ///
 /// # Errors
-/// A description of valid seeds, if `text` is not one.
+/// A description of the valid seeds if `text` is invalid.
 pub fn seed(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
@@ -59,7 +59,7 @@ pub fn seed(text: &str) -> Result<u64, String> {
 /// Parses a sensor model.
 ///
 /// # Errors
-/// A description of valid sensor models, if `text` is not one.
+/// A description of the valid sensor models if `text` is invalid.
 pub(super) fn model(text: &str) -> Result<SensorModel, String> {
     SensorModel::ALL
         .into_iter()
@@ -80,7 +80,7 @@ pub fn model_name(model: SensorModel) -> &'static str {
 /// Parses a template of predictions.
 ///
 /// # Errors
-/// A description of valid templates, if `text` is not one.
+/// A description of the valid templates if `text` is invalid.
 pub(super) fn template(text: &str) -> Result<Template, String> {
     Template::ALL
         .into_iter()

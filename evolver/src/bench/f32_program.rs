@@ -1,8 +1,8 @@
 //! The baseline: a straightforward `f32` implementation of the same model.
 //!
-//! It uses tanh of the standard library, and computes input activations once per genome and hidden
-//! activations once per step. It runs in the plain world. Its results differ from the integer
-//! results only through rounding.
+//! The program uses the standard library's tanh, and computes input activations once per genome and
+//! hidden activations once per step. It runs in the plain world. Its results differ from the
+//! integer results only through rounding.
 
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{Action, Decision, Genome, SensorBits, Turn};

@@ -18,7 +18,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
 /// The output of `evolver bench`. Speeds are robot-steps per CPU-second with model C on 15 × 15
-/// unless the name says otherwise.
+/// unless the name indicates otherwise.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[allow(missing_docs)]
 pub struct Report {

@@ -76,7 +76,7 @@ pub struct PictureArgs {
         allow_hyphen_values = true
     )]
     cell_px: String,
-    /// Steps between two frames of an animation [default: about a hundred frames].
+    /// Number of steps between two frames of an animation [default: about a hundred frames].
     #[arg(long, value_name = "N", requires = "film", allow_hyphen_values = true)]
     every: Option<String>,
     /// Frames per second of an animation.

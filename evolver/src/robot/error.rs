@@ -86,8 +86,8 @@ pub enum Problem {
         /// The operating system's error.
         error: std::io::Error,
     },
-    /// The robot stopped answering.
-    #[error("the robot stopped answering while it was {doing}{}{reader}", doing.consequence())]
+    /// The robot stopped replying.
+    #[error("the robot stopped replying while it was {doing}{}{reader}", doing.consequence())]
     Unanswered {
         /// The robot's activity at that time.
         doing: Doing,

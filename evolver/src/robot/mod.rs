@@ -118,7 +118,7 @@ impl Robot {
     /// only the requests that restore the robot's state are sent.
     ///
     /// # Errors
-    /// [`RobotError`] if the port does not exist, nothing answers, or a different device answers.
+    /// [`RobotError`] if the port does not exist, no device replies, or a different device replies.
     pub fn connect(
         port: &PortName,
         baud: u32,
@@ -149,7 +149,7 @@ impl Robot {
     /// Identifies the robot again, in a new conversation.
     ///
     /// # Errors
-    /// [`RobotError`] if the robot does not answer or rejects the request.
+    /// [`RobotError`] if the robot does not reply or rejects the request.
     pub fn identify(&mut self) -> Result<&Identity, RobotError> {
         self.line.start_over();
         self.reported = None;
@@ -222,7 +222,7 @@ impl Robot {
     /// Starts the control loop.
     ///
     /// # Errors
-    /// [`RobotError`] if the robot does not answer or rejects the request.
+    /// [`RobotError`] if the robot does not reply or rejects the request.
     pub fn start(&mut self) -> Result<(), RobotError> {
         self.done(Doing::Switching, &Request::Start)
     }
@@ -230,7 +230,7 @@ impl Robot {
     /// Stops the motors and the control loop.
     ///
     /// # Errors
-    /// [`RobotError`] if the robot does not answer or rejects the request.
+    /// [`RobotError`] if the robot does not reply or rejects the request.
     pub fn stop(&mut self) -> Result<(), RobotError> {
         self.done(Doing::Switching, &Request::Stop)
     }
@@ -238,7 +238,7 @@ impl Robot {
     /// Resets the controller. The robot must be stopped.
     ///
     /// # Errors
-    /// [`RobotError`] if the robot does not answer or rejects the request.
+    /// [`RobotError`] if the robot does not reply or rejects the request.
     pub fn reset(&mut self) -> Result<(), RobotError> {
         self.steps = 0;
         self.done(Doing::Switching, &Request::Reset)
@@ -248,7 +248,7 @@ impl Robot {
     /// reset.
     ///
     /// # Errors
-    /// [`RobotError`] if the robot does not answer or rejects the request.
+    /// [`RobotError`] if the robot does not reply or rejects the request.
     pub fn step(&mut self, sensors: SensorBits) -> Result<Stepped, RobotError> {
         let request = Request::Step { sensors };
         let stepped = self
@@ -265,7 +265,7 @@ impl Robot {
     /// Returns the robot's telemetry; `None` if the robot restarted since the last request.
     ///
     /// # Errors
-    /// [`RobotError`] if the robot does not answer or rejects the request.
+    /// [`RobotError`] if the robot does not reply or rejects the request.
     pub fn telemetry(&mut self) -> Result<Option<(Report, LineCounters)>, RobotError> {
         let told = self
             .line

@@ -1,4 +1,4 @@
-//! Prints the number of instructions of a layer of activations and of a control step.
+//! Prints the instruction counts of a layer of activations and of a control step.
 //!
 //! Runs under QEMU with `-icount`. The counts depend on the compiler, so the expected
 //! output is not stored.

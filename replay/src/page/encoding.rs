@@ -9,7 +9,7 @@
 //! | headings of the starting poses | one per robot |
 //! | mispredicted bits in each step; robots that moved in each step | four per step |
 //! | robots in the dominant structure in each state | four per state |
-//! | blocks of [`BLOCK`] steps, see below | |
+//! | blocks of [`BLOCK`] steps (see below) | |
 //!
 //! A block has `n` steps and their `n + 1` states; its last state is the first of the next block.
 //! A block consists of planes: one byte per robot and step (or state), robot by robot. A plane of

@@ -46,7 +46,7 @@ pub enum PageError {
     },
 }
 
-/// Checks that a recording of this size fits a page.
+/// Checks that a recording of this size fits on a page.
 ///
 /// # Errors
 /// [`PageError`] if the recording is too large.

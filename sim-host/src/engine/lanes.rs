@@ -1,6 +1,6 @@
 //! Lanes: the prediction networks of 32 robots, computed side by side, four steps at a time.
 //!
-//! A robot's inputs of four steps are one 64-bit word, a *block*. The caller assigns robots and
+//! A robot's inputs in four steps form one 64-bit word, a *block*. The caller assigns robots and
 //! times to lanes: lanes are independent of each other.
 
 use minimal_surprise_controller::network::MAX_HIDDEN;

@@ -10,7 +10,7 @@ use super::repeats::History;
 use super::robot_word::ROBOTS_AT_ONCE;
 use super::swarm::{Behaviour, Swarm};
 
-/// The inputs of a number of robots over a number of blocks.
+/// The inputs of several robots over several blocks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recording {
     blocks: usize,

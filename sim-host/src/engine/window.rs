@@ -9,7 +9,7 @@
 use minimal_surprise_controller::sensor::{Cell, MAX_SENSORS, SensorModel};
 use minimal_surprise_controller::{Action, SensorBits};
 
-/// Number of cells of the window and of bits of a network's input.
+/// Number of cells in the window, which is the number of bits in a network's input.
 pub(super) const WINDOW_BITS: usize = 15;
 /// All sensors and the action value fit the window.
 const _: () = assert!(MAX_SENSORS < WINDOW_BITS);
