@@ -418,7 +418,7 @@ fn a_robot_of_another_kernel_is_refused_before_anything_is_stopped_or_erased() {
     ] {
         let run = evolver.run(arguments);
         let words = format!(
-            "the robot has kernel {}, this program has",
+            "the robot has kernel {}, but this program has",
             KernelId(kernel.0)
         );
         assert_failed(&run, &[&words]);

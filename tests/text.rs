@@ -1,4 +1,4 @@
-//! Text from users: every program that reads an encoding of it decodes it correctly.
+//! Text from users: programs that read its encodings decode it correctly.
 
 use minimal_surprise_evolution::text::{
     self, FILE_NAME_BYTES_MAX, TextError, decode, file_name, file_name_except, html, is_hidden,

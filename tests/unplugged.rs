@@ -82,8 +82,8 @@ impl SlotBytes {
         self.word(at) != self.before[at..at + WORD_BYTES]
     }
 
-    /// Returns the last word erased by a step; at the slot's start the write count, because every
-    /// header begins with the same word.
+    /// Returns the last word erased by a step; for the step at the slot's start, the write count,
+    /// because every header begins with the same word.
     fn last_word(&self, step: usize) -> usize {
         let from = step * ERASE_STEP_BYTES;
         let mut words = (from..from + ERASE_STEP_BYTES).step_by(WORD_BYTES);

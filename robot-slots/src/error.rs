@@ -3,7 +3,7 @@
 use minimal_surprise_controller::DecodeError;
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 
-/// Error for a place that cannot hold two slots.
+/// Error: the place cannot hold two slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

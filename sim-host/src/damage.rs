@@ -34,7 +34,7 @@ pub enum DamageError {
         grid: Grid,
     },
     /// The area and the swarm are on different grids.
-    #[error("the area is on a {area} grid, the swarm on a {swarm} grid")]
+    #[error("the area is on a {area} grid, but the swarm is on a {swarm} grid")]
     OtherGrid {
         /// Grid of the area.
         area: Grid,

@@ -55,7 +55,7 @@ pub fn draw_members(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool)
 #[non_exhaustive]
 pub enum DrawingError {
     /// The rows have different lengths.
-    #[error("line {line} has {found} cells, the first row {expected}")]
+    #[error("line {line} has {found} cells, but the first row has {expected}")]
     UnevenRows {
         /// Line number in the text, counted from 1.
         line: usize,

@@ -100,7 +100,7 @@ pub enum Heading {
     South = 3,
 }
 
-/// Error for a number that is not a heading.
+/// Error: the number is not a heading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("heading {0}; headings are 0 (east), 1 (north), 2 (west) and 3 (south)")]
 pub struct UnknownHeading(pub u8);

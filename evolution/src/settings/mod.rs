@@ -331,7 +331,7 @@ fn read_genome_for(path: &Path, topology: Topology) -> Result<Genome, String> {
         Ok(file.genome().clone())
     } else {
         Err(format!(
-            "the genome is for {}, the run is for {}",
+            "the genome is for {}, but the run is for {}",
             describe(file.topology()),
             describe(topology)
         ))

@@ -118,7 +118,8 @@ impl AboutInput for SettingError {
     }
 }
 
-/// An incomplete run is bad input; a complete run with any unreadable file is damaged, a failure.
+/// An incomplete run is bad input; a complete run with an unreadable file is damaged, which is a
+/// failure.
 impl AboutInput for ReadRunError {
     fn is_bad_input(&self) -> bool {
         match self {

@@ -72,7 +72,7 @@ pub enum Problem {
     },
     /// The robot uses different arithmetic.
     #[error(
-        "the robot has kernel {robot}, this program has kernel {KERNEL_ID}; update one of them"
+        "the robot has kernel {robot}, but this program has kernel {KERNEL_ID}; update one of them"
     )]
     OtherKernel {
         /// The robot's kernel.
@@ -229,7 +229,7 @@ impl std::fmt::Display for Heard {
             Self::Echo => write!(f, "it only echoes the requests"),
             Self::OtherVersion { found } => write!(
                 f,
-                "it uses version {found} of the protocol, this program uses version {}",
+                "it uses version {found} of the protocol, but this program uses version {}",
                 minimal_surprise_link::PROTOCOL_VERSION
             ),
             Self::Frames => write!(f, "its frames are not replies"),

@@ -20,7 +20,7 @@ pub enum EnginePath {
     Avx512(x86::Avx512),
 }
 
-/// Error for the name of a path that is unknown or not supported by this processor.
+/// Error: the name of a path is unknown, or this processor does not support the path.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{PATH_VARIABLE} names the path {0:?}; this processor has {list}", list = EnginePath::names())]
 pub struct PathError(String);

@@ -53,7 +53,7 @@ pub struct GatheredRun {
     pub names: Vec<Structure>,
     /// Share of robots in each structure at the end, in the order of [`Structure::ALL`].
     pub shares: [f64; 8],
-    /// Numbers of lines.
+    /// Numbers of lines, by direction.
     pub lines: LineCounts,
 }
 

@@ -139,7 +139,7 @@ fn structure_order(shared: &[Shared<'_>]) -> Vec<String> {
 enum Counted {
     /// Runs; a tied run counts as a fraction for each of its structures.
     TiedRuns,
-    /// Runs; and genomes, by the majority of their new starts.
+    /// Runs, and genomes by the majority of their new starts.
     RunsAndGenomes,
     /// New starts; a tied start counts as a fraction for each of its structures.
     TiedStarts,
