@@ -12,7 +12,7 @@ use minimal_surprise_controller::{Action, Controller, DecodeError, EncodedGenome
 pub trait Robot {
     /// Adds the neighbours detected since the last step.
     fn detect(&mut self, neighbours: &mut Neighbours<16>);
-    /// Drives one cell ahead, unless it is occupied.
+    /// Drives one cell ahead, unless that cell is occupied.
     fn drive_ahead(&mut self);
     /// Turns by 90 degrees.
     fn turn(&mut self, turn: Turn);
@@ -26,7 +26,7 @@ pub enum StartError {
     CellSize(InvalidCellSize),
 }
 
-/// Runs the genome in `flash` forever, on a grid with cells of `cell_mm`.
+/// Runs the genome in `flash` forever, on a grid whose cells are `cell_mm` wide.
 pub fn control_loop(robot: &mut impl Robot, flash: &[u8], cell_mm: f32) -> Result<(), StartError> {
     let genome = EncodedGenome::decode(flash).map_err(StartError::Genome)?;
     let cell = CellSize::from_mm(cell_mm).map_err(StartError::CellSize)?;

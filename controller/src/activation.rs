@@ -1,4 +1,4 @@
-//! The activation: tanh in Q3.12, as eight cubics.
+//! The activation: tanh in Q3.12, approximated by eight cubics.
 //!
 //! The magnitude `m = |x|` is scaled so that one product yields the segment number and the position
 //! inside the segment: `z = 30·m`, segment `z >> 16`, position `t = (z & 0xffff) − 32768` in Q16,
@@ -9,8 +9,7 @@
 //! shuffle. [`activate`] computes the same values in 32 bits, with multiply-accumulate instructions
 //! and without testing the sign.
 //!
-//! From 17476 units (4.27) upwards the value is 4095: within one unit of 4096·tanh for every larger
-//! x.
+//! If x is 17476 units (4.27) or more, the value is 4095, which is within one unit of 4096·tanh.
 //!
 //! The function is frozen: [`KERNEL_ID`] holds a hash of all its values, and every genome container
 //! stores it.
@@ -66,8 +65,8 @@ pub(crate) static ROWS: [[i32; 4]; 32] = {
 
 /// Computes tanh in Q3.12: `act(x)` is within 1 unit of 4096·tanh(x / 4096) for every `i16`.
 ///
-/// Odd, monotone, in \[−4095, 4095\]; `act(−32768) = act(−32767)`. Tests:
-/// `activation_error_max_all_inputs`, `activation_is_odd_and_monotone`,
+/// The function is odd and monotone; its values are in \[−4095, 4095\], and `act(−32768) =
+/// act(−32767)`. Tests: `activation_error_max_all_inputs`, `activation_is_odd_and_monotone`,
 /// `value_stability_activation`. Departure from the paper: the paper uses tanh in floating point.
 #[inline]
 #[must_use]

@@ -135,7 +135,7 @@ pub enum DecodeError {
         /// Length of the header, in bytes.
         length: usize,
     },
-    /// The genome was evolved with a different arithmetic.
+    /// The genome was evolved for a different kernel.
     #[error("evolved for kernel {found}; this controller is kernel {KERNEL_ID}")]
     OtherKernel {
         /// The kernel of the genome.
@@ -161,7 +161,7 @@ pub enum DecodeError {
     /// The sensor model cannot be combined with the predictions.
     #[error(transparent)]
     NoSuchTopology(#[from] TopologyError),
-    /// The numbers of weights do not match the topology or the length.
+    /// The numbers of weights do not match the topology or the length of the weight block.
     #[error(
         "{action} action and {prediction} prediction weights in {bytes} bytes; the topology has \
          {expected_action} and {expected_prediction} in {}", 2 * (expected_action + expected_prediction)
@@ -186,7 +186,7 @@ pub enum DecodeError {
     },
 }
 
-/// The buffer is too small for the container.
+/// Error: the buffer is too small for the container.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("a buffer of {found} bytes; at most {CONTAINER_BYTES_MAX} are needed")]
@@ -225,9 +225,9 @@ impl<'a> EncodedGenome<'a> {
     /// Checks every part of a container.
     ///
     /// # Errors
-    /// [`DecodeError`] if a check fails: the first error, in the order magic, version, length,
-    /// checksum, header, kernel, topology, sizes, weights. Input shorter than [`PREFIX_BYTES`] is
-    /// reported before all other errors.
+    /// [`DecodeError`] if a check fails. The first error is reported, in the order magic, version,
+    /// length, checksum, header, kernel, topology, sizes, weights. Input shorter than
+    /// [`PREFIX_BYTES`] is reported before all other errors.
     pub fn decode(bytes: &'a [u8]) -> Result<Self, DecodeError> {
         let prefix = Prefix::read(bytes)?;
         let block = checked_block(bytes, prefix.container_bytes)?;
@@ -338,7 +338,7 @@ pub fn encode<'b>(
 }
 
 /// Returns the length of the container that starts with these bytes, at most
-/// [`CONTAINER_BYTES_MAX`]. The first [`PREFIX_BYTES`] are enough.
+/// [`CONTAINER_BYTES_MAX`]. The first [`PREFIX_BYTES`] are sufficient.
 ///
 /// # Errors
 /// [`DecodeError::TooShort`], [`DecodeError::WrongMagic`], [`DecodeError::UnknownVersion`] or

@@ -58,9 +58,9 @@ pub(crate) fn activate_all<const N: usize>(values: &mut [i16; N], count: usize) 
 /// Number of terms in each sum of [`output_signs`].
 pub(crate) const OUTPUT_TERMS: usize = 14;
 
-/// Computes the hidden layer before activation: for each of the first `count` rows, the Q3.12 sum
-/// of its products with `terms`, with the row's entry of `values` as the last term, and stores the
-/// sum in that entry.
+/// Computes the hidden layer before activation. For each of the first `count` rows, the Q3.12 sum
+/// of the row's products with `terms` replaces the row's entry of `values`, which is also the last
+/// term.
 #[inline]
 pub(crate) fn hidden_sums<const N: usize>(
     rows: &Aligned<[[i16; MAX_TERMS]; N]>,
@@ -230,7 +230,7 @@ pub(crate) fn action_signs<const N: usize, const O: usize>(
     ((!negative).reverse_bits() >> (32 - count as u32)) as u16
 }
 
-/// Selects every pair of terms by its two bits of `inputs`.
+/// Selects each pair of terms by the pair's two bits in `inputs`.
 #[inline]
 pub(crate) fn select_terms(
     pairs: &Aligned<[[[i16; 2]; 4]; MAX_TERMS / 2]>,

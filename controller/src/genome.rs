@@ -7,10 +7,12 @@ use crate::fixed::WEIGHT_MAX_Q3_12;
 use crate::topology::{MAX_WEIGHTS, Topology};
 use rand_core::Rng;
 
-/// Initial weights are uniform within ± this value (0.5 in Q3.12), inclusive.
+/// Maximum initial weight (0.5 in Q3.12). Initial weights are drawn uniformly between minus this
+/// value and this value, inclusive.
 pub const INITIAL_WEIGHT_MAX_Q3_12: i16 = 2048;
 
-/// Mutation adds a value uniform within ± this value (0.4 in Q3.12), inclusive.
+/// Maximum addend of a mutation (0.4 in Q3.12). Addends are drawn uniformly between minus this
+/// value and this value, inclusive.
 pub const MUTATION_MAX_Q3_12: i16 = 1638;
 
 /// The weights of an action network and, unless all predictions are fixed, a prediction network.
@@ -38,7 +40,7 @@ pub struct Genome {
     weights: [i16; MAX_WEIGHTS],
 }
 
-/// The weights do not form a genome.
+/// Error: the weights do not form a genome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -72,7 +74,7 @@ impl Genome {
     /// Creates a genome from weights in genome order.
     ///
     /// # Errors
-    /// [`GenomeError`] if their number does not match the topology or one of them is −32768.
+    /// [`GenomeError`] if the number of weights does not match the topology or a weight is −32768.
     pub fn from_weights(topology: Topology, weights: &[i16]) -> Result<Self, GenomeError> {
         if weights.len() != topology.weights() {
             return Err(GenomeError::WrongCount {
@@ -95,7 +97,7 @@ impl Genome {
         genome
     }
 
-    /// Draws a genome with weights uniform within ±[`INITIAL_WEIGHT_MAX_Q3_12`].
+    /// Draws a genome whose weights are uniformly distributed within ±[`INITIAL_WEIGHT_MAX_Q3_12`].
     #[must_use]
     pub fn random<R: Rng>(topology: Topology, rng: &mut R) -> Self {
         let mut genome = Self::zeroed(topology);
@@ -105,8 +107,8 @@ impl Genome {
         genome
     }
 
-    /// Mutates each weight independently, with the given rate, by adding a value uniform within
-    /// ±[`MUTATION_MAX_Q3_12`]; the result saturates at ±32767.
+    /// Mutates each weight independently, with the given rate, by adding a value drawn uniformly
+    /// within ±[`MUTATION_MAX_Q3_12`]; the result saturates at ±32767.
     pub fn mutate<R: Rng>(&mut self, rate: MutationRate, rng: &mut R) {
         for weight in self.weights_mut() {
             if u64::from(rng.next_u32()) < rate.per_2_32 {
@@ -171,7 +173,7 @@ impl MutationRate {
         }
     }
 
-    /// Returns the rate `threshold / 2³²`; `None` above 1.
+    /// Returns the rate `threshold / 2³²`; `None` if the rate is above 1.
     #[must_use]
     pub const fn from_per_2_32(threshold: u64) -> Option<Self> {
         if threshold > 1 << 32 {
@@ -184,8 +186,9 @@ impl MutationRate {
     }
 }
 
-/// Draws a value uniform in `-max..=max` with Lemire's method: multiplies one word per draw by the
-/// number of values, takes the upper half, and rejects the few words that would bias the result.
+/// Draws a value uniformly from `-max..=max` with Lemire's method: multiplies one word per draw by
+/// the number of values, takes the upper half, and rejects the few words that would bias the
+/// result.
 fn uniform_within<R: Rng>(rng: &mut R, max: i16) -> i16 {
     let values = 2 * max.unsigned_abs() as u32 + 1;
     let rejected_below = values.wrapping_neg() % values;
@@ -321,7 +324,7 @@ mod tests {
         assert_eq!(draw(&[u32::MAX]), 1);
 
         // 2³² modulo 4097 is 256: a word is rejected if the lower half of its product with 4097 is
-        // less. The factor is the inverse of 4097 modulo 2³².
+        // less than 256. The factor is the inverse of 4097 modulo 2³².
         let of_4097 = |low: u32| low.wrapping_mul(0x00ff_f001);
         for low in [0, 1, 255] {
             assert_eq!(of_4097(low).wrapping_mul(4097), low);

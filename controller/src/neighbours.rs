@@ -36,7 +36,7 @@ pub struct CellSize {
     mm: f32,
 }
 
-/// The cell size is not a positive number.
+/// Error: the cell size is not a positive number.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("a cell size of {mm} mm; it must be a positive number")]
@@ -109,14 +109,14 @@ impl<const N: usize> Neighbours<N> {
         self.detections.clear();
     }
 
-    /// Returns the detections kept.
+    /// Returns the detections in the list.
     #[must_use]
     pub fn detections(&self) -> &[Detection] {
         &self.detections
     }
 
-    /// Returns the number of detections rejected so far: not a number, infinite, or with a negative
-    /// range.
+    /// Returns the number of detections rejected so far because a value was not finite or the range
+    /// was negative.
     #[must_use]
     pub fn refused(&self) -> u32 {
         self.refused
@@ -146,8 +146,8 @@ impl<const N: usize> Neighbours<N> {
     }
 }
 
-/// Returns the number of cells ahead and to the left of the robot; for distant neighbours, a cell
-/// outside every model.
+/// Returns a neighbour's cell, as the number of cells ahead and to the left of the robot. If the
+/// neighbour is far away, the cell is outside every model.
 fn cell_of(detection: Detection, cell: CellSize) -> (i32, i32) {
     let bearing = F32(detection.bearing_rad % core::f32::consts::TAU);
     let cells = F32(detection.range_mm / cell.mm);

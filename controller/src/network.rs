@@ -35,7 +35,7 @@ pub struct Shape {
     recurrent: bool,
 }
 
-/// A network of these sizes cannot be built.
+/// Error: a network of these sizes cannot be built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -281,7 +281,7 @@ fn read_weights(
     }
 }
 
-/// Selects every pair of terms by its two bits of `inputs`.
+/// Selects each pair of terms by the pair's two bits in `inputs`.
 #[cfg(not(has_smlad))]
 #[inline]
 fn select_terms(

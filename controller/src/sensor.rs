@@ -5,7 +5,7 @@
 use crate::fixed::MAX_TERMS;
 use serde::{Deserialize, Serialize};
 
-/// Maximum number of sensors of a model (C).
+/// Number of sensors of the largest model, C.
 ///
 /// Assertions guard everything that depends on this number: the sums in this crate, the engine's
 /// window, the noise draws and the step hashes.

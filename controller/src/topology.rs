@@ -12,9 +12,9 @@ pub enum Template {
     Line,
     /// One robot directly ahead.
     Pair,
-    /// Robots two cells ahead and behind; model C only.
+    /// Robots two cells ahead and two cells behind; model C only.
     Square,
-    /// Robots on the four diagonals and two cells ahead and behind; model C only.
+    /// Robots on the four diagonals, two cells ahead and two cells behind; model C only.
     TriangularLattice,
 }
 
@@ -38,7 +38,7 @@ impl Template {
         }
     }
 
-    /// Returns the sensors that the template predicts occupied; `None` if the model does not
+    /// Returns the sensors that the template predicts to be occupied; `None` if the model does not
     /// support the template.
     #[must_use]
     pub const fn bits(self, model: SensorModel) -> Option<SensorBits> {
@@ -75,8 +75,8 @@ pub enum Prediction {
     /// The network predicts every sensor.
     #[default]
     Free,
-    /// The sensors in the template are always predicted occupied; the network predicts the others.
-    /// Available only for the line on model C.
+    /// The sensors in the template are always predicted to be occupied; the network predicts the
+    /// others. Available only for the line on model C.
     PartlyPredefined(Template),
     /// Every sensor has the fixed prediction of the template; there is no prediction network.
     Predefined(Template),
@@ -90,7 +90,7 @@ pub struct Topology {
     prediction: Prediction,
 }
 
-/// The sensor model and the template cannot be combined.
+/// Error: the sensor model and the template cannot be combined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -185,8 +185,8 @@ impl Topology {
         })
     }
 
-    /// Returns the fixed predictions, zero elsewhere; also the prediction for a robot's first
-    /// reading.
+    /// Returns the fixed predictions, with zeros for all other sensors. This is also the prediction
+    /// for a robot's first reading.
     #[must_use]
     pub const fn fixed(self) -> SensorBits {
         match self.prediction {

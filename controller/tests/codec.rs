@@ -143,7 +143,7 @@ fn rng() -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(SEED)
 }
 
-/// Draws numbers of every length, including the largest number.
+/// Draws a provenance with numbers of every encoded length, including the largest numbers.
 fn random_provenance(rng: &mut ChaCha8Rng) -> Provenance {
     let mut number = || rng.next_u64() >> (rng.next_u32() % 64);
     let seed = number();
@@ -171,7 +171,7 @@ fn random_genome(topology: Topology, rng: &mut ChaCha8Rng) -> Genome {
     Genome::from_weights(topology, &weights).unwrap()
 }
 
-/// Returns one container of every topology.
+/// Returns one container per topology.
 fn containers() -> Vec<Vec<u8>> {
     let mut rng = rng();
     Topology::ALL
@@ -312,7 +312,7 @@ fn config(cases: u32) -> ProptestConfig {
     }
 }
 
-/// Generates arbitrary bytes, and values that distinguish the fields.
+/// Generates arbitrary bytes, but often bytes that have a special meaning in some field.
 fn byte() -> impl Strategy<Value = u8> {
     prop_oneof![any::<u8>(), 0_u8..6, Just(0x7f), Just(0x80), Just(0xff)]
 }
@@ -492,7 +492,7 @@ fn half_a_million_random_containers_reach_every_outcome_and_never_panic() {
         };
         let header_end = PREFIX_BYTES + usize::from(bytes[5]);
         if below(4, &mut rng) == 0 {
-            // The start of a header, then anything.
+            // The start of a header, then arbitrary bytes.
             let right = PREFIX_BYTES + below(20, &mut rng);
             rng.fill_bytes(&mut bytes[right..]);
         } else {
