@@ -11,17 +11,18 @@ use std::path::{Path, PathBuf};
 pub struct DamagedRuns(BTreeMap<PathBuf, String>);
 
 impl DamagedRuns {
-    /// Reads a run; returns `None` if it is incomplete or damaged. A damaged run is added.
+    /// Reads a run; returns `None` if it is incomplete or damaged. If it is damaged, adds it to the
+    /// damaged ones.
     pub fn read(&mut self, run: &Path) -> Option<FinishedRun> {
         self.take(run, FinishedRun::read_if_complete(run)).flatten()
     }
 
-    /// Returns the result of reading a run; if reading failed, adds the run.
+    /// Returns the result of reading a run; if reading failed, adds the run to the damaged ones.
     pub fn take<T>(&mut self, run: &Path, read: Result<T, ReadRunError>) -> Option<T> {
         read.map_err(|error| self.add(run, error.cause())).ok()
     }
 
-    /// Adds a run.
+    /// Adds a damaged run with its error.
     pub fn add(&mut self, run: &Path, error: impl fmt::Display) {
         self.0.insert(run.to_owned(), error.to_string());
     }
@@ -31,7 +32,7 @@ impl DamagedRuns {
         self.0.extend(other.0);
     }
 
-    /// Checks whether a run is damaged.
+    /// Checks whether a run is one of the damaged ones.
     #[must_use]
     pub fn contains(&self, run: &Path) -> bool {
         self.0.contains_key(run)

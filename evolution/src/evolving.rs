@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use std::thread::{self, ScopedJoinHandle};
 
 /// Evaluates and saves all remaining generations; returns false if `stop` was set before the last
-/// one. When this returns, everything evaluated is saved.
+/// one was evaluated. All evaluated generations are saved before this returns.
 ///
 /// # Errors
 /// [`FileError`] if a generation cannot be saved; the last checkpoint is kept.

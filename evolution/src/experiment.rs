@@ -27,7 +27,7 @@ pub struct GenerationRecord {
     pub worst_matches: u64,
     /// Slot of the best genome.
     pub best_slot: u32,
-    /// The repetition that determined the best genome's fitness, its worst one.
+    /// The best genome's worst repetition, which determined the genome's fitness.
     pub worst_repetition: u32,
     /// Robot movement M in that repetition (paper, Eq. 4).
     #[serde(deserialize_with = "ranges::fraction")]
@@ -195,7 +195,7 @@ impl Experiment {
     /// Returns the result of the last generation evaluated; `None` before the first.
     ///
     /// # Errors
-    /// [`WorldError`] if the trial does not fit its grid.
+    /// [`WorldError`] if the trial's poses do not fit the grid.
     pub fn result(&self) -> Result<Option<EvolutionResult>, WorldError> {
         let (Some(record), Some(genome)) = (self.history.last(), &self.best) else {
             return Ok(None);

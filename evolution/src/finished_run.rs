@@ -66,9 +66,9 @@ pub enum ReadRunError {
         /// The file that is missing.
         missing: &'static str,
     },
-    /// The run is marked complete, but is not.
+    /// The run is marked complete, but a file is missing or invalid.
     #[error(
-        "{error}\nthe run is marked complete, so it was damaged, or made by a different version: \
+        "{error}\nthe run is marked complete, so it was damaged, or written by a different version: \
          delete {} and repeat the command that made it",
         path.display()
     )]
@@ -158,7 +158,7 @@ pub enum StateError {
         problem: String,
     },
     /// The numbers of starting and final poses differ.
-    #[error("{}: {found} final poses of {start} robots that started", path.display())]
+    #[error("{}: {found} final poses for {start} starting poses", path.display())]
     Count {
         /// The file.
         path: PathBuf,
@@ -201,7 +201,7 @@ pub struct FinalState {
     pub repetition: u32,
     /// The run's hash.
     pub hash: String,
-    /// The hash of the steps in between, if the file contains one.
+    /// The hash of the run's steps, if the file contains one.
     pub steps_hash: Option<RecordedHash>,
     /// Movement M.
     pub movement: f64,

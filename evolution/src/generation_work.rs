@@ -1,14 +1,14 @@
 //! Evaluations of a generation, distributed over the threads.
 //!
 //! Every thread takes the next task as soon as it is free. Evaluation times differ between genomes,
-//! so that a thread may wait for another at the end; the last genomes are therefore split into
-//! halves of their repetitions. Results do not depend on which thread executes which task.
+//! so a thread may have to wait for another one at the end. Therefore, the repetitions of the last
+//! genomes are split in half. Results do not depend on which thread executes which task.
 
 use minimal_surprise_controller::{Genome, Topology};
 use minimal_surprise_sim::{Engine, EnginePath, Evaluation, Evaluator, Scenario, Trial, TrialSet};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Number of genomes whose repetitions are split into halves.
+/// Number of genomes whose repetitions are split in half.
 const HALVED: usize = 8;
 
 /// The evaluations of a generation.

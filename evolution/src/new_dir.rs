@@ -1,7 +1,7 @@
 //! Directories that appear complete or not at all, even if several processes create the same one.
 //!
 //! A directory is created beside its final path under a temporary name, then renamed. It is locked
-//! until then, which distinguishes directories being written from leftovers of killed processes.
+//! until then; the lock distinguishes directories being written from leftovers of killed processes.
 
 use crate::files::{self, FileError};
 use crate::lock::{LOCK, Lock, LockError};

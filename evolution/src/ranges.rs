@@ -1,5 +1,5 @@
 //! Range checks on values read from a run directory, performed while parsing: a value out of range
-//! causes an error with its position, so that drawings and loops only see valid values.
+//! causes an error with its position, so that drawings and loops only receive valid values.
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
@@ -59,7 +59,7 @@ pub(crate) fn hash_of(text: &str) -> Result<String, String> {
     }
     let begin: String = hash.chars().take(70).collect();
     Err(format!(
-        "{begin:?}; expected a hash of 64 digits, 0 to 9 and a to f"
+        "{begin:?}; expected a hash of 64 hexadecimal digits, 0 to 9 and a to f"
     ))
 }
 

@@ -72,7 +72,7 @@ pub struct ResilienceRow {
 
 /// Computes the rows of Tables 7 and 8 for a run: as it evolved, from new starts, and after damage.
 ///
-/// Without noise, every repetition of a removal gives the same result, so it is run once.
+/// Without noise, every repetition of a removal gives the same result, so only one is run.
 ///
 /// # Errors
 /// [`DamageError`] if the damaged area is invalid or the remaining swarm cannot be run.
@@ -158,8 +158,8 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Returns the median; for an even number of values, the mean of the middle two; 0 if there are
-/// none.
+/// Returns the median; for an even number of values, the mean of the middle two; 0 if there are no
+/// values.
 #[must_use]
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();

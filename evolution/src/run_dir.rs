@@ -227,10 +227,10 @@ impl RunDir {
         unfinished(path, settings, &text).map(drop)
     }
 
-    /// Delays `generations.csv` until the run is complete. Used if other processes may be doing the
-    /// same run, unnoticed because the file system has no locks: a slower process could otherwise
-    /// replace the complete table with its shorter one. All other files written before the end are
-    /// checkpoints, each of which is valid.
+    /// Delays `generations.csv` until the run is complete. Used if other processes may be executing
+    /// the same run unnoticed, because the file system has no locks: a slower process could
+    /// otherwise replace the complete table with its shorter one. All other files written before
+    /// the end are checkpoints, each of which is valid.
     #[must_use]
     pub fn with_table_last(mut self) -> Self {
         self.table_last = true;
@@ -280,7 +280,8 @@ impl RunDir {
         let mut buffer = [0; CONTAINER_BYTES_MAX];
         let genome = codec::encode(&result.genome, result.provenance, &mut buffer)
             .expect("the buffer holds any genome");
-        // Written again: another process, killed since, may have written the last checkpoint.
+        // Written again: another process, which has since been killed, may have written the last
+        // checkpoint.
         let table = generations(experiment);
         files::replace(&self.file(GENERATIONS), table.as_bytes())?;
         files::replace(&self.file(BEST), genome)?;

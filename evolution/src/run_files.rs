@@ -112,7 +112,7 @@ pub struct FinalFile {
     pub schema_version: u32,
     #[serde(deserialize_with = "ranges::hash")]
     pub hash: String,
-    /// Uses version 1, in files of older programs.
+    /// Version 1, in files of older programs.
     #[serde(
         default,
         deserialize_with = "ranges::optional_hash",
@@ -276,7 +276,7 @@ pub fn generations(experiment: &Experiment) -> String {
 /// Formats a value as JSON.
 ///
 /// # Panics
-/// Only if a map in the value has keys that are not text, which no value here has.
+/// If the value contains a map whose keys are not text; no value in a run directory does.
 #[must_use]
 pub fn json(value: &impl Serialize) -> String {
     let mut text = serde_json::to_string_pretty(value).expect("plain values");

@@ -38,7 +38,7 @@ impl Selection {
     /// Prepares to draw parents of genomes with these fitness values, by slot.
     ///
     /// # Panics
-    /// If `fitness` is empty, or the sum does not fit 64 bits.
+    /// If `fitness` is empty, or its sum does not fit in 64 bits.
     #[must_use]
     pub fn of(self, fitness: &[u64]) -> Parents<'_> {
         match self {
@@ -107,7 +107,7 @@ impl Roulette {
     /// Creates a wheel for these fitness values.
     ///
     /// # Panics
-    /// If the sum does not fit 64 bits.
+    /// If the sum of the fitness values does not fit in 64 bits.
     #[must_use]
     pub fn new(fitness: &[u64]) -> Self {
         let uniform = fitness.iter().all(|&count| count == 0);

@@ -1,13 +1,13 @@
 //! The hash of the steps of one run of a swarm: readings, actions, predictions and poses.
 //!
-//! A chain of SHA-256, so that a decoder can check the steps one at a time: it starts
+//! A chain of SHA-256 hashes, so that a decoder can check the steps one at a time. The chain starts
 //! with the SHA-256 of a fixed text, the number of robots in 64 bits and their starting poses. Each
 //! step is `h ← SHA-256(h ‖ step)`: for every robot its reading in 16 bits, action and turn in 8
 //! bits each, its new prediction in 16 bits, and its pose afterwards. A pose is x and y in 16 bits
 //! each and the heading in 8. All little-endian.
 //!
-//! In version 1, a reading also has the bits drawn by noise beyond the sensors of the model.
-//! Without noise, both versions give the same hash.
+//! In version 1, a reading also includes the noise bits drawn beyond the model's sensors. Without
+//! noise, both versions give the same hash.
 
 use crate::text::hex;
 use minimal_surprise_controller::SensorModel;

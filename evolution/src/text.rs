@@ -8,14 +8,14 @@ use std::ffi::{OsStr, OsString};
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
-/// Maximum length of a [`file_name`], in bytes: file systems allow 255, which leaves room for
-/// endings and temporary names.
+/// Maximum length of a [`file_name`], in bytes: file systems allow 255; the rest is left for
+/// extensions and temporary names.
 pub const FILE_NAME_BYTES_MAX: usize = 100;
 
 /// Number of hexadecimal digits of the hash in a [`file_name`].
 const HASH_DIGITS: usize = 12;
 
-/// Device names on Windows, reserved with any ending.
+/// Device names on Windows, reserved with any extension.
 const DEVICES: [&str; 6] = ["con", "prn", "aux", "nul", "com", "lpt"];
 
 /// Returns a file name for any text. Different texts get different names, even on file systems that
@@ -163,7 +163,8 @@ pub fn is_hidden(c: char) -> bool {
             | '\u{1d173}'..='\u{1d17a}' | '\u{e0000}'..='\u{e0fff}')
 }
 
-/// Escapes text for a terminal, on one line: [hidden](is_hidden) characters as `\n`, `\u{1b}`.
+/// Escapes text for a terminal, on one line: [hidden](is_hidden) characters become escapes such as
+/// `\n` and `\u{1b}`.
 #[must_use]
 pub fn terminal(text: &str) -> String {
     visible(text, "")
@@ -175,7 +176,7 @@ pub fn terminal_lines(text: &str) -> String {
     visible(text, "\n\t")
 }
 
-/// Escapes a path for a terminal; bytes that are not UTF-8 as `\xff`.
+/// Escapes a path for a terminal; bytes that are not UTF-8 become escapes such as `\xff`.
 #[must_use]
 pub fn terminal_path(path: &Path) -> String {
     let mut shown = String::new();
@@ -374,8 +375,8 @@ fn os_string(bytes: Vec<u8>) -> OsString {
     String::from_utf8_lossy(&bytes).into_owned().into()
 }
 
-/// Quotes an argument for a POSIX shell: printable, and on one line unless the argument ends with a
-/// line break.
+/// Quotes an argument for a POSIX shell. The result is printable and on one line, unless the
+/// argument ends with a line break.
 #[must_use]
 pub fn shell_word(word: impl AsRef<OsStr>) -> String {
     let word = word.as_ref();

@@ -1,7 +1,7 @@
 //! Time that a run took, summed over all processes that worked on it.
 //!
 //! The time is saved with every checkpoint, so that a killed process loses at most one generation's
-//! time. It is not part of a result and enters no hash.
+//! time. It is not part of a result or of any hash.
 
 use crate::files::{self, FileError, TEXT_BYTES_MAX};
 use crate::ranges;
@@ -62,7 +62,7 @@ impl TimeSpent {
     }
 }
 
-/// Adds the time of this process to that of earlier ones.
+/// Timer that adds the time of this process to that of earlier processes.
 #[derive(Clone, Debug)]
 pub struct Timer {
     before: TimeSpent,

@@ -3,7 +3,8 @@
 #[cfg(not(unix))]
 use std::time::Instant;
 
-/// CPU time of this process since the start; elapsed time if the system does not report CPU time.
+/// Stopwatch for the CPU time of this process; measures elapsed time if the system does not report
+/// CPU time.
 #[derive(Clone, Copy, Debug)]
 pub struct Stopwatch {
     #[cfg(unix)]
@@ -24,7 +25,7 @@ impl Stopwatch {
         }
     }
 
-    /// Returns the seconds since the start.
+    /// Returns the seconds since the stopwatch was started.
     #[must_use]
     pub fn cpu_seconds(self) -> f64 {
         #[cfg(unix)]

@@ -41,7 +41,7 @@ impl FileError {
         self.error.kind() == ErrorKind::AlreadyExists
     }
 
-    /// Returns true if a different path could work; false for a failure of the system.
+    /// Returns true if a different path could work; false for a system failure.
     #[must_use]
     pub fn is_bad_path(&self) -> bool {
         use ErrorKind as Kind;
@@ -71,7 +71,7 @@ pub enum Existing {
 }
 
 impl Existing {
-    /// Converts the flag `--overwrite`.
+    /// Returns the behaviour that the flag `--overwrite` selects.
     #[must_use]
     pub fn with_overwrite(overwrite: bool) -> Self {
         if overwrite {

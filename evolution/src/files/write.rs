@@ -1,4 +1,4 @@
-//! Atomic file writes: to a temporary name, synced, then renamed.
+//! Atomic file writes: a file is written under a temporary name, synced, then renamed.
 
 use super::{Existing, FileError, parent};
 use sha2::{Digest, Sha256};
@@ -12,8 +12,8 @@ use tempfile::TempPath;
 /// Ending of temporary files and directories.
 const PART: &str = ".part";
 
-/// Returns a temporary name in the same folder, of fixed length: a hash of the final name, and a
-/// random number, because two machines that share a file system can have equal process IDs.
+/// Returns a temporary name of fixed length in the same folder: a hash of the final name, and a
+/// random number, because process IDs are not unique on a file system that several machines share.
 #[must_use]
 pub fn beside(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default();
@@ -93,8 +93,9 @@ pub fn create(path: &Path, contents: &[u8]) -> Result<(), FileError> {
 }
 
 /// Replaces a file as a whole: if the process is killed, either the old or the new file exists. The
-/// new one gets the permissions of the old one. A symbolic link is kept, and its target replaced. A
-/// target that cannot be replaced (a device, a pipe, a mounted file) is written in place.
+/// new one gets the permissions of the old one. A symbolic link is kept, and its target is
+/// replaced. A target that cannot be replaced (a device, a pipe, a mounted file) is written in
+/// place.
 ///
 /// # Errors
 /// [`FileError`] if the file cannot be written; the old file is then unchanged.

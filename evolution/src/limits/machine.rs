@@ -3,8 +3,8 @@
 use std::path::Path;
 use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System};
 
-/// Returns the memory that this process can still allocate: the minimum of the machine's, its
-/// cgroup's and its address space's.
+/// Returns the memory that this process can still allocate: the minimum of the memory available in
+/// the machine, in the process's cgroup and in its address space.
 pub(super) fn memory_available() -> Option<u64> {
     let mut system = System::new().ok()?;
     system.refresh_memory();

@@ -1,5 +1,5 @@
-//! Memory and disk that a command needs, estimated from its settings before anything is allocated
-//! or written. A command that needs more than is available is rejected.
+//! Memory and disk space that a command needs, estimated from its settings before anything is
+//! allocated or written. A command that needs more than is available is rejected.
 //!
 //! Estimates are of the peak and, above about ten megabytes, accurate to within a factor of two;
 //! the `limits` test measures this. If the system does not report how much is available, no command
@@ -19,7 +19,7 @@ use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use unit_prefix::NumberPrefix;
 
-/// Smallest need that is reported before a command starts, in bytes.
+/// Smallest estimate that is reported before a command starts, in bytes.
 const WORTH_SAYING: f64 = 1e9;
 /// Block size of a disk, in bytes: files occupy whole blocks.
 const BLOCK_BYTES: f64 = 4096.0;
@@ -34,11 +34,11 @@ const BLOCK_BYTES: f64 = 4096.0;
 pub struct TooMuch {
     /// The settings to change.
     pub setting: String,
-    /// The largest part of the need.
+    /// Description of the largest item in the estimate.
     pub what: &'static str,
-    /// Size of that part, in bytes.
+    /// Size of that item, in bytes.
     pub part: u64,
-    /// Total estimated need, in bytes.
+    /// Total estimate, in bytes.
     pub needed: u64,
     /// Available bytes.
     pub available: u64,
@@ -128,7 +128,7 @@ impl Needs {
         let checkpoint = checkpoint_bytes(settings);
         // Two generations and the checkpoint being written.
         let genomes = population * 2.0 * size::<Genome>() + checkpoint;
-        // All trials, their copy in the trial set and, without noise, a copy split into halves.
+        // All trials, their copy in the trial set and, without noise, a copy split in half.
         let copies = if scenario.noise().is_none() { 3.0 } else { 2.0 };
         let trials = repetitions * copies * trial_bytes(scenario);
         // In memory, in the checkpoint, and in the text of the table.
@@ -314,7 +314,7 @@ impl Needs {
         check(&self.disk, Place::Disk(directory.to_owned()))
     }
 
-    /// Describes a need large enough to surprise users; returns `None` if it is small.
+    /// Describes the estimate if it is large enough to surprise users; otherwise, returns `None`.
     #[must_use]
     pub fn announcement(&self) -> Option<String> {
         let [memory, disk] = [self.memory(), self.disk()];
@@ -328,11 +328,12 @@ impl Needs {
 /// Memory and disk space needed by runs that are executed one after the other.
 #[derive(Clone, Debug, Default)]
 pub struct NeedsOfRuns {
-    /// Memory and, until it is complete, disk space that the largest run needs.
+    /// Memory that the largest run needs, and disk space that it needs until it is complete.
     largest: Needs,
     runs: u64,
-    /// Bytes of disk space that complete runs keep: all runs, and the largest.
+    /// Bytes of disk space that all runs keep once they are complete.
     left: f64,
+    /// Bytes of disk space that the largest of the complete runs keeps.
     left_most: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Settings of an evolution, from a TOML file, flags of the same names or a program: checked, and
-//! written back in full.
+//! Settings of an evolution. They come from a TOML file, from flags of the same names or from a
+//! program, and are checked and written back in full.
 
 mod overrides;
 mod table;
@@ -28,7 +28,7 @@ pub enum SettingError {
     /// The value is not valid.
     #[error("{place} = {value}: {problem}")]
     Invalid {
-        /// Place where it was given.
+        /// Place where the value was given.
         place: Place,
         /// The given value.
         value: String,
@@ -46,7 +46,7 @@ pub enum SettingError {
     /// No setting has this name.
     #[error("{place} is not a setting; settings are {}", names())]
     UnknownKey {
-        /// Place where it was given.
+        /// Place where the name was given.
         place: Place,
     },
     /// The file is not valid TOML.
@@ -242,8 +242,8 @@ impl Settings {
             .saturating_mul(generations)
     }
 
-    /// Returns the number of bits scored in one repetition, by which matches are divided to give
-    /// the fitness.
+    /// Returns the number of bits scored in one repetition, by which the matches are divided to
+    /// compute the fitness.
     #[must_use]
     pub fn scored_bits(&self) -> u64 {
         self.scenario.scored_bits(self.topology.sensors())

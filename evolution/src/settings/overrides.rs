@@ -136,7 +136,7 @@ impl Overrides {
         super::topology(&self.values()?).map_err(|(keys, problem)| self.invalid(keys, problem))
     }
 
-    /// Returns the given values, and defaults for the others.
+    /// Returns the given values, and defaults for the other settings.
     pub(super) fn values(&self) -> Result<Values, SettingError> {
         let mut values = Values::default();
         for setting in SETTINGS {

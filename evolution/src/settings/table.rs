@@ -27,7 +27,7 @@ pub struct Setting {
     pub default: &'static str,
     /// Description of valid values.
     pub valid: &'static str,
-    /// Key of its list of values in a suite; empty if a suite has no such list.
+    /// Key of the setting's list of values in a suite; empty if a suite has no such list.
     pub list: &'static str,
     meaning: &'static str,
     pub(super) set: fn(&mut Values, &str) -> Result<(), String>,
@@ -264,7 +264,7 @@ settings! {
         (selection != Selection::Roulette).then(|| selection.to_string().into())
     };
 
-    /// Probability that a child has two parents, and each weight from either.
+    /// Probability that a child has two parents and takes each weight from either.
     crossover(f64): f64 = 0.0,
     "crossover", "P", default "0",
     valid "from 0 to 1", list "crossover",

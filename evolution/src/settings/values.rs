@@ -107,7 +107,7 @@ pub fn describe(topology: Topology) -> String {
     }
 }
 
-/// Largest seed that is drawn: whole numbers up to this are exact in programs that read JSON
+/// Largest seed that is drawn: whole numbers up to this one are exact in programs that read JSON
 /// numbers as floating point.
 pub const DRAWN_SEED_MAX: u64 = 1 << 53;
 
@@ -117,7 +117,7 @@ pub fn seed_text(seed: u64) -> Option<String> {
     (seed > DRAWN_SEED_MAX).then(|| seed.to_string())
 }
 
-/// Adds a seed to a JSON object, and as `seed_text` if needed.
+/// Adds a seed to a JSON object and, if needed, also as text in `seed_text`.
 pub fn add_seed(object: &mut serde_json::Value, seed: u64) {
     object["seed"] = seed.into();
     if let Some(text) = seed_text(seed) {
