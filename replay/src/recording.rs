@@ -109,7 +109,7 @@ impl Recording {
     /// Damages the final state of an evolution, and records the run that follows.
     ///
     /// # Errors
-    /// [`DamageError`] if no robot is left to run.
+    /// [`DamageError`] if the damage cannot be applied, or no robot is left to run.
     pub fn of_damage(
         name: &str,
         finished: &FinishedRun,

@@ -87,13 +87,13 @@ pub enum Mark {
     HitOccupied,
     /// Empty, as predicted.
     HitEmpty,
-    /// Occupied, but predicted empty.
+    /// Occupied, but predicted to be empty.
     MissOccupied,
-    /// Empty, but predicted occupied.
+    /// Empty, but predicted to be occupied.
     MissEmpty,
-    /// Predicted occupied; the run ends before the robot senses the cell.
+    /// Predicted to be occupied; the run ends before the robot senses the cell.
     ExpectsOccupied,
-    /// Predicted empty; the run ends before the robot senses the cell.
+    /// Predicted to be empty; the run ends before the robot senses the cell.
     ExpectsEmpty,
 }
 

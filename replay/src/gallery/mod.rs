@@ -84,13 +84,13 @@ pub struct Written {
     pub unfinished: usize,
     /// Runs left out because they are damaged, and folders that could not be read.
     pub damaged: DamagedRuns,
-    /// Size of all pages.
+    /// Size of all pages, in bytes.
     pub bytes: u64,
     /// True if another process wrote the gallery in the meantime.
     pub by_another: bool,
 }
 
-/// Writes the gallery of all runs in some directories: run directories, or directories that contain
+/// Writes the gallery of all runs in the given directories, which are run directories or contain
 /// run directories. A new gallery is published as a whole or not at all. If another process
 /// publishes one in the meantime, that one is kept: the same runs give the same pages. In an
 /// existing folder, pages are replaced one by one and other files are kept.
@@ -208,8 +208,8 @@ impl Found {
         Ok(())
     }
 
-    /// Checks that the memory suffices for the largest recordings, one per thread. Read errors are
-    /// reported later.
+    /// Checks that there is enough memory for the largest recordings, one per thread. Read errors
+    /// are reported later.
     fn check_memory(&self) -> Result<(), TooMuch> {
         let at_once = self.runs.len().min(rayon::current_num_threads()) as f64;
         let settings = self

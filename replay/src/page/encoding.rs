@@ -16,13 +16,13 @@
 //! states stores the first state, then the exclusive or of each state with the previous one.
 //! Numbers are little-endian.
 //!
-//! | plane of a block | one byte per | present if |
+//! | plane of a block | one byte per | present for |
 //! |---|---|---|
-//! | move: bit 0 action, bit 1 turn, bit 2 whether the robot moved | step | it is not a trajectory
-//! |
-//! | prediction, low byte; high byte | state | it is not a trajectory; more than 8 sensors |
-//! | x low, x high, y low, y high, heading | state | it is a trajectory |
-//! | structures | state | always |
+//! | move: bit 0 action, bit 1 turn, bit 2 set if the robot moved | step | runs |
+//! | prediction, low byte | state | runs |
+//! | prediction, high byte | state | runs with more than 8 sensors |
+//! | x low, x high, y low, y high, heading | state | trajectories |
+//! | structures | state | both |
 
 use crate::recording::Recording;
 use data_encoding::BASE64;
@@ -95,8 +95,8 @@ fn sensors(recording: &Recording) -> usize {
         .map_or(0, |data| data.topology.sensors())
 }
 
-/// Returns the number of mispredicted bits and of robots that moved, per step, and of robots in the
-/// dominant structure, per state.
+/// Returns the number of mispredicted bits for each step, then the number of robots that moved for
+/// each step, then the number of robots in the dominant structure for each state.
 fn counts(recording: &Recording) -> impl Iterator<Item = u32> {
     let steps = 0..recording.steps();
     let mispredicted = steps.clone().map(move |t| {

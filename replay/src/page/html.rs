@@ -28,7 +28,7 @@ pub struct Document<'a> {
 }
 
 impl Document<'_> {
-    /// Returns the text of the file. Its security policy prevents the browser from loading
+    /// Returns the text of the file. The page's security policy prevents the browser from loading
     /// anything.
     #[must_use]
     pub fn to_html(&self) -> String {

@@ -18,7 +18,7 @@ use minimal_surprise_sim::damage::Damage;
 use minimal_surprise_sim::{Grid, Heading, Structure};
 use serde_json::{Value, json};
 
-/// Maximum number of robot-steps on a page, which browsers open without trouble.
+/// Maximum number of robot-steps on a page; browsers open a page of this size without trouble.
 pub const ROBOT_STEPS_MAX: u64 = 20_000_000;
 /// Maximum number of cells of a page's torus.
 pub const CELLS_MAX: u32 = 4_000_000;
@@ -187,7 +187,7 @@ fn title(recording: &Recording) -> String {
     title
 }
 
-/// Returns the last part of a path: pages do not disclose the folders of their author.
+/// Returns the last part of a path, so that pages do not disclose their author's folders.
 pub(super) fn source(name: &str) -> String {
     let path = std::path::Path::new(name);
     let last = path.file_name().map(|last| last.to_string_lossy());

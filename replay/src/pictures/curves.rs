@@ -19,7 +19,7 @@ use std::convert::Infallible;
 /// Ratio of a curve's height to its width.
 const SHAPE: f64 = 0.56;
 
-/// Number of plotters' integer coordinates per millimetre or pixel.
+/// Number of integer coordinates (which plotters uses) per millimetre or pixel.
 const FINE: f64 = 100.0;
 
 /// Width of a curve on a screen, in pixels.
@@ -121,7 +121,7 @@ impl Chart {
         (width, size.whole(width * SHAPE))
     }
 
-    /// Draws the chart from its north-west corner.
+    /// Draws the chart with its north-west corner at `corner`.
     pub(super) fn draw(
         &self,
         drawing: &mut Drawing,

@@ -16,7 +16,7 @@ pub enum Size {
 }
 
 impl Size {
-    /// Returns the font size: 7 points in millimetres, or pixels.
+    /// Returns the font size, in millimetres (7 points) or in pixels.
     pub(super) fn words(self) -> f64 {
         match self {
             Self::Paper(_) => 2.47,
@@ -132,7 +132,7 @@ impl Drawing {
         format!("{document}\n")
     }
 
-    /// Draws a filled rectangle from its north-west corner.
+    /// Draws a filled rectangle with its north-west corner at (`x`, `y`).
     pub(super) fn area(
         &mut self,
         (x, y): (f64, f64),

@@ -103,7 +103,7 @@ impl Film<'_> {
     /// # Errors
     /// [`PictureError`] under the conditions of [`Film::gif`], and if ffmpeg is missing or fails.
     pub fn mp4(&self) -> Result<Vec<u8>, PictureError> {
-        // MP4 is not written sequentially, so it cannot go to a pipe.
+        // MP4 is not written sequentially, so it cannot be written to a pipe.
         let folder = tempfile::tempdir().map_err(PictureError::Ffmpeg)?;
         let file = folder.path().join("film.mp4");
         let mut ffmpeg = None;
@@ -193,8 +193,8 @@ fn not_started(error: std::io::Error) -> PictureError {
 
 /// The colours of a GIF, in order of appearance.
 ///
-/// A GIF needs few, because robots look the same in every cell. Once the palette is full, text gets
-/// the nearest colours.
+/// A GIF needs few, because robots look the same in every cell. Once the palette is full, text is
+/// drawn in the nearest colours.
 struct Palette {
     /// Red, green and blue of each colour; the first stands for unchanged pixels.
     colours: Vec<u8>,

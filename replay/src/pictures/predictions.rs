@@ -79,7 +79,7 @@ impl Surroundings<'_> {
         (left - right + 1.0, ahead - behind + 1.0)
     }
 
-    /// Draws the cells from their north-west corner.
+    /// Draws the cells; their north-west corner is at (`west`, `north`).
     pub(super) fn draw(&self, drawing: &mut Drawing, (west, north): (f64, f64), side: f64) {
         let theme = drawing.theme;
         let [(most_ahead, most_left), _] = self.bounds();

@@ -250,7 +250,7 @@ pub(super) fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f
     let (width, height) = (f64::from(scene.width), f64::from(scene.height));
     let (east, south) = (west + width * side, north + height * side);
     drawing.area((west, north), (east - west, south - north), theme.cell);
-    // Grid rows count from the south, picture rows from the north.
+    // Grid rows are counted from the south, picture rows from the north.
     let corner = |x: u16, y: u16| {
         (
             west + f64::from(x) * side,
@@ -301,7 +301,7 @@ pub(super) fn swarm(drawing: &mut Drawing, scene: &Scene, (west, north): (f64, f
     area(drawing, scene, corner, side);
 }
 
-/// Draws the outline of the damaged cells; open where the area continues across the edge.
+/// Draws the outline of the damaged cells, which is open where the area continues across the edge.
 fn area(drawing: &mut Drawing, scene: &Scene, corner: impl Fn(u16, u16) -> (f64, f64), side: f64) {
     let is_inside = |x: u16, y: u16| scene.area.contains(&[x % scene.width, y % scene.height]);
     let mut outline = Data::new();

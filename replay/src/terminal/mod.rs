@@ -39,7 +39,7 @@ pub fn play(
     let mut player = Player::new(recording, colouring);
     let played = ratatui::try_init()
         .and_then(|mut terminal| watch(&mut terminal, &mut player, paints, ascii, stop));
-    // Also if the setup failed halfway.
+    // The terminal is restored even if the setup failed halfway.
     let restored = ratatui::try_restore();
     played.and(restored)
 }

@@ -80,7 +80,7 @@ impl<'a> Player<'a> {
         self.playing.then(|| Duration::from_secs(1) / self.speed())
     }
 
-    /// Advances by one step, and pauses at the last.
+    /// Advances by one step, and pauses at the last state.
     pub fn go_on(&mut self) {
         self.t = (self.t + 1).min(self.recording.steps());
         self.playing = self.t < self.recording.steps();
@@ -144,7 +144,7 @@ impl<'a> Player<'a> {
         self.following = true;
     }
 
-    /// Returns the next colouring; trajectories have no surprise.
+    /// Returns the next colouring; surprise is skipped for trajectories.
     fn next_colouring(&self) -> Colouring {
         match self.colouring {
             Colouring::Structure if self.recording.controller.is_some() => Colouring::Surprise,
