@@ -45,7 +45,7 @@ pub struct Client {
     last_malformed: Option<MalformedMessage>,
 }
 
-/// Reason why a request cannot be sent, at least not yet.
+/// Reason why a request cannot be sent now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RequestError {
@@ -61,8 +61,8 @@ pub enum RequestError {
         /// Size of the chunk, in bytes.
         found: usize,
     },
-    /// All 2³² numbers are used; open a new session.
-    #[error("all request numbers are used; open a new session")]
+    /// All 2³² numbers have been used; open a new session.
+    #[error("all request numbers have been used; open a new session")]
     SessionExhausted,
 }
 
@@ -101,7 +101,7 @@ impl Client {
         self.attempts_max = attempts_max;
     }
 
-    /// Returns the bytes to send for a request. Wait [`Request::timeout_ms`] for the reply.
+    /// Returns the bytes to send for a request. Then wait [`Request::timeout_ms`] for the reply.
     ///
     /// # Errors
     /// [`RequestError`] if the request cannot be sent; send nothing in that case.
@@ -158,11 +158,11 @@ impl Client {
         }
     }
 
-    /// Returns the bytes to send again; to be called if the reply has not arrived in time.
+    /// Returns the bytes to send again. Call this if the reply has not arrived in time.
     ///
     /// # Errors
-    /// [`GaveUp`] if that was the last attempt, or no request was pending; a new request may
-    /// follow.
+    /// [`GaveUp`] if the last attempt has timed out, or no request is pending. A new request may
+    /// then be sent.
     pub fn timed_out(&mut self) -> Result<&[u8], GaveUp> {
         match self.pending {
             Some((sequence, attempts)) if attempts < self.attempts_max => {

@@ -98,7 +98,7 @@ pub enum Reply<'a> {
     Identity(Identity<'a>),
     /// The request was executed; there is no result to report.
     Done,
-    /// The genome is in use, also after a restart.
+    /// The genome is in use, even after a restart.
     Committed {
         /// Number of the genome among all written to this robot.
         write_count: u32,
@@ -234,7 +234,8 @@ pub struct LineCounters {
     pub no_frame: u32,
 }
 
-/// Reason why a request was not executed. Unless stated for a variant, nothing has changed.
+/// Reason why a request was not executed. Unless stated otherwise for a variant, nothing has
+/// changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
@@ -294,7 +295,8 @@ pub enum MalformedMessage {
     /// A request arrived instead of a reply, or a reply instead of a request.
     #[error("a message in the wrong direction")]
     WrongWay,
-    /// The bytes are not a message, surplus bytes follow it, or its chunk is too long.
+    /// The bytes are not a message, surplus bytes follow the message, or the message's chunk is too
+    /// long.
     #[error("not a message of this protocol")]
     NotAMessage,
 }

@@ -8,8 +8,8 @@ use crate::message::{
 use minimal_surprise_controller::SensorBits;
 
 /// Functions that execute the requests on the robot. Each is called once per request, even if the
-/// request arrives several times. Unless stated for the [`Refusal`], a refused request has changed
-/// nothing.
+/// request arrives several times. Unless stated otherwise for the [`Refusal`], a refused request
+/// has changed nothing.
 pub trait Handler {
     /// Returns the robot's firmware, genome and status.
     fn identify(&mut self) -> Identity<'_>;
@@ -48,13 +48,13 @@ pub trait Handler {
     /// [`Refusal::Running`] if the robot is running.
     fn reset(&mut self) -> Result<(), Refusal>;
 
-    /// Starts the control loop; no effect on a running robot.
+    /// Starts the control loop; has no effect on a running robot.
     ///
     /// # Errors
     /// [`Refusal::Unsupported`] if the robot does not support the request.
     fn start(&mut self) -> Result<(), Refusal>;
 
-    /// Stops motors and control loop; no effect on a stopped robot.
+    /// Stops motors and control loop; has no effect on a stopped robot.
     ///
     /// # Errors
     /// [`Refusal::Unsupported`] if the robot does not support the request.
@@ -103,7 +103,7 @@ struct Conversation {
     last: (u32, u32),
     /// The reply to the last request, as sent.
     reply: Wire<WIRE_BYTES_MAX>,
-    /// The reply to a request of no open session.
+    /// The reply to a request that does not belong to the open session.
     no_session: Wire<24>,
     counters: LineCounters,
 }
