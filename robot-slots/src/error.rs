@@ -3,7 +3,7 @@
 use minimal_surprise_controller::DecodeError;
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 
-/// Error: the place cannot hold two slots.
+/// Error: the location cannot hold two slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -50,7 +50,7 @@ pub enum Defect {
     Refused(#[from] DecodeError),
 }
 
-/// Error of an update. The genome in use stays in use, also after a restart.
+/// Error of an update. The genome in use stays in use, even after a restart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum UpdateError<E: core::fmt::Debug> {

@@ -133,7 +133,7 @@ impl InUse<'_> {
     }
 }
 
-/// An update between its begin and its commit.
+/// An update that has begun and is not committed yet.
 #[derive(Clone, Copy, Debug)]
 struct Update {
     slot: Slot,
@@ -196,7 +196,7 @@ impl<F: NorFlash> Slots<F> {
     /// Unreadable flash is reported as a [`SlotState`], not as an error.
     ///
     /// # Errors
-    /// [`PlaceError`] if two slots cannot be placed there.
+    /// [`PlaceError`] if two slots cannot be placed at `offset`.
     pub fn open(flash: F, offset: u32, room: &mut impl Room<F>) -> Result<Self, PlaceError> {
         let () = Self::CHIP_FITS;
         let erase_size = F::ERASE_SIZE;
@@ -349,7 +349,7 @@ impl<F: NorFlash> Slots<F> {
     }
 
     /// Completes the update: reads the container back, checks it and commits it. Returns the write
-    /// count. After that, the new genome is in use, also after a restart.
+    /// count. The new genome is then in use, even after a restart.
     ///
     /// # Errors
     /// [`UpdateError::NotBegun`], [`UpdateError::Incomplete`], [`UpdateError::NotWritten`],

@@ -5,13 +5,13 @@ use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 
 /// Access to the bytes of a container in flash.
 pub trait Room<F: ReadNorFlash> {
-    /// Returns the `length` bytes at `at`, a byte address in flash that is a multiple of its read
-    /// size. `length` is at most the maximum size of a container. `None` if the bytes cannot be
-    /// read.
+    /// Returns the `length` bytes at `at`, or `None` if they cannot be read. `at` is a byte
+    /// address, a multiple of the flash's read size; `length` is at most the maximum size of a
+    /// container.
     fn container<'a>(&'a mut self, flash: &'a mut F, at: u32, length: usize) -> Option<&'a [u8]>;
 }
 
-/// Memory for one container, 1.3 KB. Make it a `static`, or part of one: it is large for a stack.
+/// Memory for one container, 1.3 KB. Place it in a `static`, because it is large for a stack.
 #[derive(Clone, Debug)]
 pub struct Buffer {
     bytes: [u8; ROOM_BYTES],

@@ -1,11 +1,11 @@
 //! Cuts the power at every moment of an update of the genome slots, and again at every moment of
 //! the recovery.
 //!
-//! A moment is a byte of a write, the end of a write before it is reported, or one of five ways in
-//! which an erase can end. Every first cut is tested. With `TEST_ALL=1` in a release build, every
-//! second cut after each first cut is tested too; otherwise, only a sample of the second cuts.
-//! `POWER_CUT=write_size:erase_size:first:second` tests one pair of cuts; a failure prints the
-//! pair.
+//! Power is cut at every byte of a write, at the end of a write before the chip reports it, and
+//! during an erase, which can then end in five ways. Every first cut is tested. With `TEST_ALL=1`
+//! in a release build, every second cut after each first cut is tested too; otherwise, only a
+//! sample of the second cuts. `POWER_CUT=write_size:erase_size:first:second` tests one pair of
+//! cuts; a failure prints the pair.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, CRC_32C, Provenance, encode};
@@ -84,7 +84,7 @@ impl<'a> Genomes<'a> {
         }
     }
 
-    /// Restarts the robot and returns which genome it runs.
+    /// Restarts the robot and returns the genome that it runs.
     fn after_restart<const W: usize, const E: usize>(
         &self,
         flash: &mut MockFlash<W, E>,
@@ -553,7 +553,7 @@ fn empty_interrupted_and_unreadable_slots_are_distinguished() {
     assert_eq!(Slot::ALL.map(|slot| slots.state(slot)), expected);
     assert_eq!(states(&mut begun), expected);
 
-    // Words of a different program in place of the header and the commit record.
+    // Words written by a different program in place of the header and the commit record.
     for at in [0, COMMIT_AT] {
         let mut strange = blank.clone();
         strange.write(Flash::OFFSET + at, b"ELF!").unwrap();
@@ -695,7 +695,7 @@ fn a_container_takes_one_write_per_block_and_no_empty_write() {
             let mut slots = Slots::open(Flash::new(), Flash::OFFSET, room).unwrap();
             assert_eq!(slots.write(genome, room), Ok(1));
             let blocks = genome.len().div_ceil(BLOCK_BYTES) as u64;
-            // Plus the header before them and the commit record after them.
+            // One more write for the header before them, and one for the commit record after them.
             assert_eq!(slots.release().counts.writes, 1 + blocks + 1);
         }
     }
