@@ -27,7 +27,8 @@ pub struct Outcome {
     pub matches: u64,
     /// Number of bits sensed.
     pub scored_bits: u64,
-    /// Number of times that each sensor was predicted occupied, counting only scored predictions.
+    /// Number of times that each sensor was predicted to be occupied, counting only scored
+    /// predictions.
     pub predicted_occupied: Vec<u64>,
     /// Poses at the end.
     pub final_poses: Vec<Pose>,

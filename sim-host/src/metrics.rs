@@ -121,7 +121,7 @@ pub struct Measures {
     /// Number of bits mispredicted, per step.
     mispredicted: Vec<u64>,
     mispredicted_so_far: u64,
-    /// Number of times that each sensor was predicted occupied.
+    /// Number of times that each sensor was predicted to be occupied.
     predicted_occupied: [u64; MAX_SENSORS],
 }
 

@@ -134,7 +134,7 @@ pub struct Trial {
     pub noise: NoiseStream,
 }
 
-/// Draws poses on uniformly drawn free cells, with uniform headings.
+/// Draws poses on uniformly drawn free cells, with uniformly drawn headings.
 ///
 /// Each robot in turn draws one of the cells that are still free, as an index into a list, and then
 /// its heading. The last cell of the list replaces a drawn cell.
@@ -146,7 +146,7 @@ pub fn random_poses(grid: Grid, robots: u32, rng: &mut Stream) -> Vec<Pose> {
     random_poses_among((0..grid.cells()).collect(), grid, robots, rng)
 }
 
-/// Draws poses like [`random_poses`], only on the given cells (numbered as in [`Grid::cell`]).
+/// Draws poses like [`random_poses`], but only on the given cells (numbered as in [`Grid::cell`]).
 ///
 /// # Panics
 /// If `robots` exceeds the number of cells.

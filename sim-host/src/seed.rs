@@ -68,7 +68,7 @@ impl SeedTree {
     }
 }
 
-/// Draws a value uniform in `0..values`, without bias (Lemire's method on 64-bit words).
+/// Draws a value uniformly from `0..values`, without bias (Lemire's method on 64-bit words).
 ///
 /// # Panics
 /// If `values` is 0.

@@ -17,7 +17,7 @@ pub struct Grid {
     height: u16,
 }
 
-/// A side of the grid is too short or too long.
+/// Error: a side of the grid is too short or too long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a grid of {width}x{height}; each side must be from {SIDE_MIN} to {SIDE_MAX} cells")]
 pub struct GridError {
@@ -31,7 +31,7 @@ impl Grid {
     /// Creates a torus of `width` × `height` cells.
     ///
     /// # Errors
-    /// [`GridError`] if a side is not within [`SIDE_MIN`] and [`SIDE_MAX`].
+    /// [`GridError`] if a side is shorter than [`SIDE_MIN`] or longer than [`SIDE_MAX`].
     pub fn new(width: u32, height: u32) -> Result<Self, GridError> {
         let sides = SIDE_MIN..=SIDE_MAX;
         if sides.contains(&width) && sides.contains(&height) {

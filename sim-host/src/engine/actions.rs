@@ -1,5 +1,5 @@
-//! Table of actions: the action network is a function of a window, shared by all robots and
-//! repetitions of a genome.
+//! Table of actions: the action network is a function of the window, so all robots and repetitions
+//! of a genome share one table.
 
 use super::path::EnginePath;
 use super::robot_word::{ENTRY_SHIFT, Entry, to_entry};
@@ -23,8 +23,8 @@ impl ActionTable {
         }
     }
 
-    /// Replaces the last genome. On AVX-512, all entries are computed at once; on other paths, each
-    /// on first use, because only a few are used.
+    /// Prepares the table for a new genome. On AVX-512, all entries are computed at once; on other
+    /// paths, each on first use, because only a few are used.
     pub(super) fn prepare(
         &mut self,
         path: EnginePath,

@@ -304,7 +304,7 @@ impl Run<'_> {
         }
     }
 
-    /// Records a few repetitions in parts of some steps, and counts the matches of each part.
+    /// Records a few repetitions in parts of several steps, and counts the matches of each part.
     fn in_parts(&mut self, repetitions_at_once: usize) {
         let (robots, steps) = (self.trials.robots(), self.trials.steps());
         let Evaluator {

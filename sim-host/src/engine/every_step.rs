@@ -5,7 +5,7 @@ use super::lanes::{BLOCK_STEPS, Blocks, LANES, Lanes, Matches};
 use super::predictor::Predictor;
 use super::recording::Recording;
 
-/// The robots of some repetitions in groups of 32; the last group may be incomplete.
+/// The robots of a few repetitions, in groups of 32; the last group may be incomplete.
 #[derive(Default)]
 pub(super) struct Groups {
     started: bool,

@@ -14,8 +14,8 @@ pub enum EnginePath {
     /// AVX2: predicts for 16 robots at once.
     #[cfg(target_arch = "x86_64")]
     Avx2(x86::Avx2),
-    /// AVX-512 with its additions up to Ice Lake and Zen 4: predicts for 32 robots at once, senses
-    /// and decides for 16.
+    /// AVX-512 with its extensions up to Ice Lake and Zen 4: predicts for 32 robots at once, and
+    /// senses and decides for 16.
     #[cfg(target_arch = "x86_64")]
     Avx512(x86::Avx512),
 }

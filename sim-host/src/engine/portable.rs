@@ -14,7 +14,7 @@ pub(super) struct Network {
     sensors: u16,
     expected_empty_at_start: u16,
     hidden: usize,
-    /// Addends to every hidden sum for each value of each five bits of a window.
+    /// Addends to every hidden sum, for every value of each group of five window bits.
     inputs: [[[i32; WIDTH]; 32]; 3],
     self_loops: [i32; WIDTH],
     /// Weights of each output and the window bit that it predicts.

@@ -1,4 +1,4 @@
-//! A genome's prediction network on each path.
+//! A genome's prediction network for each path.
 
 use super::lanes::{Blocks, Lanes, Matches};
 use super::network::PredictionWeights;

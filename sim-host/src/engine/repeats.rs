@@ -1,5 +1,5 @@
 //! Repeated states: the world is deterministic, so once all robot words equal those of an earlier
-//! time, all later states repeat too.
+//! step, all later states repeat too.
 //!
 //! States are looked up by hash and then compared in full.
 
@@ -36,8 +36,8 @@ impl History {
     }
 }
 
-/// Computes the hash of a state: a sum that can be computed in any order, in which every robot has
-/// a different odd factor.
+/// Computes the hash of a state: a sum in which every robot has a different odd factor, so that it
+/// can be computed in any order.
 fn hash(state: &[u32]) -> u32 {
     let mut factor = 0x9e37_79b9_u32;
     let mut sum = 0_u32;

@@ -25,7 +25,7 @@ pub(super) const ACTION: u32 = 1 << 31;
 
 const _: () = assert!(crate::torus::SIDE_MAX == 1 << COORDINATE_BITS);
 
-/// Robot words are padded to a multiple of this number.
+/// Number of robots processed at once. The robot words are padded to a multiple of it.
 pub(super) const ROBOTS_AT_ONCE: usize = 16;
 
 /// An action as the top byte of the addend for a robot word: bit 7 is the action, bits 5 and 6 are

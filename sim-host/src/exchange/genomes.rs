@@ -3,8 +3,8 @@
 //! Each generation has three rows of decimal numbers, for the input, hidden and output neurons of
 //! one network in genome order (see [`minimal_surprise_controller::network`]), then a blank line.
 //! All rows are padded with random numbers to the length of the longest row of the model's
-//! prediction network, the row of its hidden weights: 80 for sensor model A, 48 for B, 224 for C,
-//! and 192 for C with the line partly predefined.
+//! prediction network, which is the row of its hidden weights: 80 for sensor model A, 48 for B, 224
+//! for C, and 192 for C with the line partly predefined.
 
 use super::{ExchangeError, Lines, Problem, number};
 use minimal_surprise_controller::fixed::{FRACTION_BITS, WEIGHT_MAX_Q3_12};
@@ -31,8 +31,8 @@ pub fn read_genomes(text: &str) -> Result<Vec<GenomeRows>, ExchangeError> {
     generations(text).map(|rows| rows?.numbers()).collect()
 }
 
-/// Iterates over the generations of an `action_genomes` or a `prediction_genomes` file, at least
-/// one. Returns their rows as text, so that only the numbers that are used must be valid. The
+/// Iterates over the generations (one or more) of an `action_genomes` or a `prediction_genomes`
+/// file. Returns their rows as text, so that only the numbers that are used must be valid. The
 /// iterator ends after an error.
 pub fn generations(text: &str) -> impl Iterator<Item = Result<RowsOfText<'_>, ExchangeError>> {
     let (mut lines, mut generation, mut ended) = (Lines::of(text), 0, false);

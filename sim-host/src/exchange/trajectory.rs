@@ -26,7 +26,7 @@ pub struct Trajectory {
 const ROBOT: &str = "<t>: <x>, <y>, <heading x>, <heading y>";
 
 impl Trajectory {
-    /// Takes the poses from a trace.
+    /// Creates a trajectory from the poses of a trace.
     #[must_use]
     pub fn of_trace(generation: u32, grid: Grid, trace: &Trace) -> Self {
         let before = trace.steps.iter().map(|step| step.poses.clone());

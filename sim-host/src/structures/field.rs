@@ -38,8 +38,8 @@ impl<'a> Field<'a> {
         self.poses[robot as usize].heading
     }
 
-    /// Returns the robot on the cell at offset (dx, dy) from a robot, across the edges; at most
-    /// three cells away, the length of the shortest side.
+    /// Returns the robot on the cell at offset (dx, dy) from a robot, across the edges. The cell
+    /// must be at most three cells away, which is the length of the shortest side.
     pub(super) fn near(&self, robot: u32, (dx, dy): (i32, i32)) -> Option<u32> {
         let Pose { x, y, .. } = self.poses[robot as usize];
         let x = wrapped(i32::from(x) + dx, self.grid.width());

@@ -3,7 +3,7 @@
 //! Along an axis, take a maximal run of neighbouring robots whose headings are on that axis, and
 //! remove the outward-pointing robots at both ends of the run. The rest is a line if it has at
 //! least [`LENGTH_MIN`] robots and no two adjacent cells beside it, on the same side, are both
-//! occupied. A run around the whole torus needs no ends (paper, Sec. 2.2, rules 1 to 3).
+//! occupied. A run around the whole torus has no ends (paper, Sec. 2.2, rules 1 to 3).
 //!
 //! The paper also requires the number of neighbours on a side to be at most half the length. At
 //! most ⌈n/2⌉ of n cells in a row are non-adjacent, so this is always the case.
@@ -95,8 +95,8 @@ impl LineOrientation {
     }
 
     /// Returns the orientation that a genome forms from many starts: the orientation of more than
-    /// half of the runs; otherwise `None` (the paper's *diverse*). Runs without lines count as
-    /// runs.
+    /// half of the runs; otherwise `None` (the paper's *diverse*). Runs without lines are counted
+    /// too.
     #[must_use]
     pub fn of_most(runs: &[Option<Self>]) -> Option<Self> {
         Self::ALL.into_iter().find(|&orientation| {

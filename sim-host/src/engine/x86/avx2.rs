@@ -16,7 +16,7 @@ const HALF: usize = 16;
 /// A prediction network laid out for [`run_block`].
 #[repr(align(64))]
 pub(in super::super) struct Network {
-    /// For each hidden neuron, the sums for each value of each three bits of a window.
+    /// For each hidden neuron, the sums for every value of each group of three window bits.
     inputs: [[[i32; 8]; TABLES]; 2 * PAIRS],
     /// Self-loop of each hidden neuron, in its half of a pair; zero in the other half.
     self_loops: [i32; 2 * PAIRS],

@@ -12,7 +12,7 @@ use core::arch::x86_64::*;
 /// A prediction network laid out for [`Network::run_block`].
 #[repr(align(64))]
 pub(in super::super::super) struct Network {
-    /// For each hidden neuron, the sums for each value of each five bits of a window.
+    /// For each hidden neuron, the sums for every value of each group of five window bits.
     inputs: [[[i32; 32]; 3]; 2 * PAIRS],
     /// Self-loop of each hidden neuron, in its half of a pair; zero in the other half.
     self_loops: [i32; 2 * PAIRS],
@@ -345,7 +345,7 @@ static ROBOT_ORDER: Lookup = {
     Lookup(order)
 };
 
-/// Indices that take two steps of eight robots from two registers of blocks: the first 16 entries
+/// Indices that select two steps of eight robots from two registers of blocks: the first 16 entries
 /// of the packed order, for the first step and for the second.
 static TWO_STEPS: Lookup = {
     let mut places = [0; LANES];
