@@ -341,8 +341,9 @@ pub fn encode<'b>(
 /// [`CONTAINER_BYTES_MAX`]. The first [`PREFIX_BYTES`] are sufficient.
 ///
 /// # Errors
-/// [`DecodeError::TooShort`], [`DecodeError::WrongMagic`], [`DecodeError::UnknownVersion`] or
-/// [`DecodeError::ImpossibleLength`] if the prefix is invalid.
+/// [`DecodeError::TooShort`] if the prefix is incomplete; [`DecodeError::WrongMagic`],
+/// [`DecodeError::UnknownVersion`] or [`DecodeError::ImpossibleLength`] if one of its fields is
+/// invalid.
 pub fn container_length(bytes: &[u8]) -> Result<usize, DecodeError> {
     Ok(Prefix::read(bytes)?.container_bytes)
 }

@@ -301,7 +301,7 @@ fn best_fitness(path: &Path, most: u64) -> Result<Vec<f64>, ReadRunError> {
 /// Checks that a file of a run directory exists and can be read to its end.
 ///
 /// # Errors
-/// [`ReadRunError`] if the file is missing, or is a pipe or a device.
+/// [`ReadRunError`] if the file is missing or cannot be accessed, or is a pipe or a device.
 pub fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
     let path = run.join(file);
     if files::exists(&path)? {
@@ -325,7 +325,7 @@ pub fn require(run: &Path, file: &'static str) -> Result<(), ReadRunError> {
 /// file is not needed.
 ///
 /// # Errors
-/// [`ReadRunError`] if a setting is missing or invalid.
+/// [`ReadRunError`] if the settings cannot be read, or a setting is missing or invalid.
 pub fn settings_of_run(run: &Path) -> Result<Settings, ReadRunError> {
     settings_and_text_of_run(run).map(|(settings, _)| settings)
 }
@@ -373,7 +373,8 @@ pub enum Progress {
 ///
 /// # Errors
 /// [`ReadRunError::Damaged`] if the run is marked complete, but a file is missing or has a
-/// different layout, or the completion mark does not contain the hash of the run.
+/// different layout, a setting is invalid, or the completion mark does not contain the hash of the
+/// run. [`ReadRunError::File`] if the directory cannot be accessed.
 pub fn complete(path: &Path) -> Result<Option<String>, ReadRunError> {
     if !files::exists(&path.join(DONE))? {
         return Ok(None);
@@ -444,7 +445,8 @@ impl FinishedRun {
     /// Reads a run directory.
     ///
     /// # Errors
-    /// [`ReadRunError`] if the run is not complete, or a file in it is invalid.
+    /// [`ReadRunError`] if the run is not complete, or a file in it is unreadable, invalid or
+    /// inconsistent with the others.
     pub fn read(path: &Path) -> Result<Self, ReadRunError> {
         require(path, DONE)?;
         OF_COMPLETE

@@ -75,7 +75,7 @@ pub struct ResilienceRow {
 /// Without noise, every repetition of a removal gives the same result, so only one is run.
 ///
 /// # Errors
-/// [`DamageError`] if the damaged area is invalid or the remaining swarm cannot be run.
+/// [`DamageError`] if the damage cannot be applied, or no robot is left to run.
 pub fn resilience(
     finished: &FinishedRun,
     structure: Structure,
@@ -99,7 +99,7 @@ pub fn resilience(
 /// Computes the row that [`resilience`] returns for the damaged swarm.
 ///
 /// # Errors
-/// [`DamageError`] if the damaged area is invalid or the remaining swarm cannot be run.
+/// [`DamageError`] if the damage cannot be applied, or no robot is left to run.
 pub fn after_damage(
     finished: &FinishedRun,
     structure: Structure,

@@ -127,7 +127,8 @@ impl RunDir {
     /// Creates the directory with everything needed to resume the run.
     ///
     /// # Errors
-    /// [`RunDirError::Exists`] if the path exists; other variants if a file cannot be written.
+    /// [`RunDirError::Exists`] if the path exists; [`RunDirError::File`] if the directory cannot be
+    /// written.
     pub fn create(
         path: &Path,
         experiment: &Experiment,
@@ -180,8 +181,8 @@ impl RunDir {
     /// Opens a run to resume it with this number of threads.
     ///
     /// # Errors
-    /// [`RunDirError`] if the run is missing, in use, changed or damaged, or needs more memory than
-    /// this machine has.
+    /// [`RunDirError`] if the run is missing, in use, changed or damaged, cannot be accessed, or
+    /// needs more memory than this machine has.
     pub fn open(path: &Path, threads: f64) -> Result<Opened, RunDirError> {
         let missing = |missing| RunDirError::NotARun {
             path: path.to_owned(),
@@ -217,7 +218,7 @@ impl RunDir {
     /// Checks whether an incomplete run can be resumed. Skips runs that do not fit into memory.
     ///
     /// # Errors
-    /// [`RunDirError`] if the run cannot be resumed.
+    /// [`RunDirError`] if a file of the run is missing, invalid or unreadable.
     pub fn check_unfinished(path: &Path) -> Result<(), RunDirError> {
         let (settings, text) = settings_of_unfinished(path)?;
         if Needs::of_evolution(&settings, 1.0).check_memory().is_err() {
@@ -271,7 +272,8 @@ impl RunDir {
     /// Saves the result and marks the run complete.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be written; the run can then be resumed.
+    /// [`FileError`] if a file cannot be written or removed. Until the run is marked complete, it
+    /// can be resumed.
     pub fn finish(
         &self,
         experiment: &Experiment,
@@ -347,7 +349,7 @@ fn finished(directory: &Path) -> Result<Option<String>, RunDirError> {
 /// files. Another process may be removing them at the same time.
 ///
 /// # Errors
-/// [`FileError`] if a file cannot be removed.
+/// [`FileError`] if the directory cannot be read or a file cannot be removed.
 pub fn tidy(directory: &Path) -> Result<(), FileError> {
     let entries = fs::read_dir(directory).map_err(FileError::at(directory))?;
     for entry in entries.flatten() {

@@ -98,7 +98,8 @@ pub fn create(path: &Path, contents: &[u8]) -> Result<(), FileError> {
 /// place.
 ///
 /// # Errors
-/// [`FileError`] if the file cannot be written; the old file is then unchanged.
+/// [`FileError`] if the file cannot be written. The old file is then unchanged, unless it is
+/// written in place.
 pub fn replace(path: &Path, contents: &[u8]) -> Result<(), FileError> {
     let replace = || {
         let old = fs::metadata(path).ok();

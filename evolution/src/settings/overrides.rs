@@ -58,7 +58,8 @@ impl Overrides {
     /// Adds the values of a TOML file, except those already given.
     ///
     /// # Errors
-    /// [`SettingError`] if the file cannot be read, is not TOML, or has unknown keys.
+    /// [`SettingError`] if the file cannot be read, is not TOML, or contains an unknown key or a
+    /// value that is neither a number nor a string.
     pub fn file(&mut self, path: &Path) -> Result<(), SettingError> {
         self.text(path, &files::read_text(path, TEXT_BYTES_MAX)?)
     }
@@ -66,7 +67,8 @@ impl Overrides {
     /// Adds the values of a TOML text, except those already given; the path is used in errors.
     ///
     /// # Errors
-    /// [`SettingError`] if the text is not TOML, or has unknown keys.
+    /// [`SettingError`] if the text is not TOML, or contains an unknown key or a value that is
+    /// neither a number nor a string.
     pub fn text(&mut self, path: &Path, text: &str) -> Result<(), SettingError> {
         let table = toml::de::DeTable::parse(text).map_err(|error| SettingError::Toml {
             path: path.to_owned(),
@@ -131,7 +133,7 @@ impl Overrides {
     /// Returns the topology selected by the values.
     ///
     /// # Errors
-    /// [`SettingError`] if the values select no valid topology.
+    /// [`SettingError`] if any value is invalid, or the values select no valid topology.
     pub fn topology(&self) -> Result<Topology, SettingError> {
         super::topology(&self.values()?).map_err(|(keys, problem)| self.invalid(keys, problem))
     }

@@ -96,7 +96,9 @@ pub struct Written {
 /// existing folder, pages are replaced one by one and other files are kept.
 ///
 /// # Errors
-/// [`GalleryError`] if a page cannot be drawn or written; a new folder is then not published.
+/// [`GalleryError`] if the folder exists and must not be replaced, there is no complete and
+/// undamaged run, memory is insufficient, or a folder or page cannot be used. A new folder is then
+/// not published.
 pub fn write(
     directories: &[PathBuf],
     out: &Path,

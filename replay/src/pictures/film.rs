@@ -65,7 +65,8 @@ impl Film<'_> {
     /// Encodes the run as a looping GIF.
     ///
     /// # Errors
-    /// [`PictureError`] if the recording lacks the requested data, or a frame is too large.
+    /// [`PictureError`] if the recording lacks the requested data, or a frame is too large or
+    /// cannot be encoded.
     pub fn gif(&self) -> Result<Vec<u8>, PictureError> {
         let mut palette = Palette::default();
         let mut frames: Vec<Frame<'static>> = Vec::new();
@@ -101,7 +102,8 @@ impl Film<'_> {
     /// Encodes the run as MP4 (H.264), using ffmpeg.
     ///
     /// # Errors
-    /// [`PictureError`] under the conditions of [`Film::gif`], and if ffmpeg is missing or fails.
+    /// [`PictureError`] if the recording lacks the requested data, a frame is too large, ffmpeg is
+    /// missing or fails, or a temporary file cannot be used.
     pub fn mp4(&self) -> Result<Vec<u8>, PictureError> {
         // MP4 is not written sequentially, so it cannot be written to a pipe.
         let folder = tempfile::tempdir().map_err(PictureError::Ffmpeg)?;

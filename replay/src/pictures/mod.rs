@@ -44,7 +44,8 @@ pub enum Picture {
 /// colouring can show.
 ///
 /// # Errors
-/// [`PictureError`] if the recording lacks the requested data.
+/// [`PictureError`] if the recording lacks the requested data, the text does not fit, or a chart
+/// cannot be laid out.
 pub fn still(
     recording: &Recording,
     what: Picture,

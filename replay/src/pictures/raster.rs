@@ -26,7 +26,8 @@ impl Pixels {
     /// Renders the drawing scaled to this width, in pixels.
     ///
     /// # Errors
-    /// [`PictureError::TooLarge`] if the picture would have more than 64 million pixels.
+    /// [`PictureError::TooLarge`] if the picture has more than 64 million pixels;
+    /// [`PictureError::Encoding`] if the drawing cannot be converted.
     pub fn of(drawing: &Drawing, width: u32) -> Result<Self, PictureError> {
         let tree = Tree::from_str(&drawing.svg(), &Options::default())
             .map_err(|error| PictureError::Encoding(error.to_string()))?;
@@ -64,7 +65,8 @@ impl Pixels {
     /// Renders a drawing of [`super::Size::Screen`] at its own size, in pixels.
     ///
     /// # Errors
-    /// [`PictureError::TooLarge`] if the picture would have more than 64 million pixels.
+    /// [`PictureError::TooLarge`] if the picture has more than 64 million pixels;
+    /// [`PictureError::Encoding`] if the drawing cannot be converted.
     pub fn of_screen(drawing: &Drawing) -> Result<Self, PictureError> {
         Self::of(drawing, drawing.width().ceil() as u32)
     }
@@ -73,7 +75,8 @@ impl Pixels {
 /// Encodes a drawing of [`super::Size::Paper`] as PNG with this resolution.
 ///
 /// # Errors
-/// [`PictureError::TooLarge`] if the picture would have more than 64 million pixels.
+/// [`PictureError::TooLarge`] if the picture has more than 64 million pixels;
+/// [`PictureError::Encoding`] if the drawing cannot be converted or encoded.
 pub fn png(drawing: &Drawing, dots_per_inch: u32) -> Result<Vec<u8>, PictureError> {
     let dots = f64::from(dots_per_inch);
     let pixels = Pixels::of(drawing, (drawing.width() / INCH * dots).round() as u32)?;

@@ -28,7 +28,7 @@ const A_LOOK: Duration = Duration::from_millis(1);
 /// support UTF-8. Restores the terminal afterwards, even after a panic.
 ///
 /// # Errors
-/// If standard output is not a terminal, or the terminal is closed.
+/// [`io::Error`] if standard output is not a terminal, or the terminal cannot be used or is closed.
 pub fn play(
     recording: &Recording,
     colouring: Colouring,

@@ -24,7 +24,7 @@ pub struct AgentsOfGeneration {
     pub fitness: f64,
     /// Poses before the first step.
     pub starts: Vec<Pose>,
-    /// Poses after the last step, of the robots in the same order.
+    /// Poses after the last step, with the robots in the same order.
     pub finals: Vec<Pose>,
 }
 
