@@ -85,7 +85,7 @@ fn mul_high(a: i32, b: i32) -> i32 {
     ((i64::from(a) * i64::from(b)) >> 16) as i32
 }
 
-/// Identity of the arithmetic: a controller rejects genomes evolved with a different kernel.
+/// Identity of the arithmetic: a controller rejects genomes evolved for a different kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct KernelId(pub [u8; 8]);

@@ -20,7 +20,7 @@ pub(crate) fn activate_all<const N: usize>(values: &mut [i16; N], count: usize) 
     if count == 0 {
         return;
     }
-    // SAFETY: reads and writes `count` values, no more than exist, and reads one of the 32 rows of
+    // SAFETY: reads and writes `count` values, all of which exist, and reads one of the 32 rows of
     // `ROWS` for each; an `i32` is word-aligned, as `ldm` requires. The flags and registers used
     // are declared.
     unsafe {
@@ -59,8 +59,8 @@ pub(crate) fn activate_all<const N: usize>(values: &mut [i16; N], count: usize) 
 pub(crate) const OUTPUT_TERMS: usize = 14;
 
 /// Computes the hidden layer before activation. For each of the first `count` rows, the Q3.12 sum
-/// of the row's products with `terms` replaces the row's entry of `values`, which is also the last
-/// term.
+/// of the row's products with `terms` replaces the row's entry in `values`, which is also the last
+/// term of the sum.
 #[inline]
 pub(crate) fn hidden_sums<const N: usize>(
     rows: &Aligned<[[i16; MAX_TERMS]; N]>,
@@ -73,7 +73,7 @@ pub(crate) fn hidden_sums<const N: usize>(
         return;
     }
     // SAFETY: reads `count` rows of eight words, `count` times the eight words of `terms`, and
-    // reads and writes `count` values; no more than exist. All are word-aligned, as `ldm` requires.
+    // reads and writes `count` values; all of them exist and are word-aligned, as `ldm` requires.
     // The flags and registers used are declared.
     unsafe {
         asm!(
@@ -135,8 +135,8 @@ pub(crate) fn output_signs<const N: usize, const O: usize>(
         return 0;
     }
     let negative: u32;
-    // SAFETY: reads `count` rows of seven words and `count` times the seven words of `terms`; no
-    // more than exist. All are word-aligned, as `ldm` requires. The flags and registers used are
+    // SAFETY: reads `count` rows of seven words and `count` times the seven words of `terms`; all
+    // of them exist and are word-aligned, as `ldm` requires. The flags and registers used are
     // declared.
     unsafe {
         asm!(
@@ -197,8 +197,8 @@ pub(crate) fn action_signs<const N: usize, const O: usize>(
         return 0;
     }
     let negative: u32;
-    // SAFETY: reads `count` rows of four words and the four words of `terms`; no more than exist.
-    // All are word-aligned, as `ldm` requires. The flags and registers used are declared.
+    // SAFETY: reads `count` rows of four words and the four words of `terms`; all of them exist and
+    // are word-aligned, as `ldm` requires. The flags and registers used are declared.
     unsafe {
         asm!(
             "ldm r0, {{r0, r1, r2, r3}}",

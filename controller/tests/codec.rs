@@ -2,7 +2,7 @@
 //! invalid bytes are rejected, and nothing panics.
 //!
 //! The tests also assemble containers field by field, without the crate's writer, so that the
-//! checksum and lengths can be correct although a later check must fail.
+//! checksum and lengths can be correct even if a later check must fail.
 
 use minimal_surprise_controller::codec::{
     BufferTooSmall, CONTAINER_BYTES_MAX, CRC_32C, HEADER_BYTES_MAX, container_length, encode,

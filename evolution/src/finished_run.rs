@@ -68,8 +68,8 @@ pub enum ReadRunError {
     },
     /// The run is marked complete, but a file is missing or invalid.
     #[error(
-        "{error}\nthe run is marked complete, so it was damaged, or written by a different version: \
-         delete {} and repeat the command that made it",
+        "{error}\nthe run is marked complete, so it was damaged, or written by a different \
+         version: delete {} and repeat the command that made it",
         path.display()
     )]
     Damaged {
@@ -298,7 +298,7 @@ fn best_fitness(path: &Path, most: u64) -> Result<Vec<f64>, ReadRunError> {
     Ok(values)
 }
 
-/// Checks that a file of a run directory exists and can be read to its end.
+/// Checks that a file of a run directory exists and is not a pipe or a device.
 ///
 /// # Errors
 /// [`ReadRunError`] if the file is missing or cannot be accessed, or is a pipe or a device.

@@ -28,7 +28,8 @@ pub struct Rerun {
 /// Runs a genome from this many new starts, in parallel.
 ///
 /// # Errors
-/// None in practice: starts are drawn on the scenario's own grid.
+/// [`WorldError`] if the starting poses do not fit the grid; this cannot occur, because they are
+/// drawn on the scenario's grid.
 pub fn rerun(
     genome: &Genome,
     conditions: &Scenario,

@@ -3,8 +3,8 @@
 //! A chain of SHA-256 hashes: `h ← SHA-256(h ‖ best ‖ total ‖ matches of slot 0, 1, …)` for every
 //! generation, starting from the SHA-256 of a fixed text; at the end `SHA-256(h ‖ weights of the
 //! best genome ‖ final poses)`. Counts are 64 bits, weights 16, a pose is x and y in 16 bits each
-//! and the heading in 8; all little-endian. The hash does not depend on version, time, path, thread
-//! count or engine.
+//! and the heading in 8; all numbers are little-endian. The hash does not depend on version, time,
+//! path, thread count or engine.
 
 use crate::text::hex;
 use minimal_surprise_controller::Genome;

@@ -4,7 +4,7 @@
 //! with the SHA-256 of a fixed text, the number of robots in 64 bits and their starting poses. Each
 //! step is `h ← SHA-256(h ‖ step)`: for every robot its reading in 16 bits, action and turn in 8
 //! bits each, its new prediction in 16 bits, and its pose afterwards. A pose is x and y in 16 bits
-//! each and the heading in 8. All little-endian.
+//! each and the heading in 8. All numbers are little-endian.
 //!
 //! In version 1, a reading also includes the noise bits drawn beyond the model's sensors. Without
 //! noise, both versions give the same hash.

@@ -101,7 +101,8 @@ impl Client {
         self.attempts_max = attempts_max;
     }
 
-    /// Returns the bytes to send for a request. Then wait [`Request::timeout_ms`] for the reply.
+    /// Returns the bytes to send for a request. After sending them, wait [`Request::timeout_ms`]
+    /// for the reply.
     ///
     /// # Errors
     /// [`RequestError`] if the request cannot be sent; send nothing in that case.

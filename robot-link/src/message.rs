@@ -223,7 +223,8 @@ pub struct LineCounters {
     pub accepted: u32,
     /// Number of repeated requests: the reply was sent again, but the request not executed again.
     pub repeated: u32,
-    /// Number of requests that arrived too late or belong to no open session; not executed.
+    /// Number of requests that arrived too late or do not belong to the open session; they are not
+    /// executed.
     pub stale: u32,
     /// Number of frames with a correct CRC that are not a request of this protocol.
     pub malformed: u32,

@@ -2,7 +2,7 @@
 //! generation.
 //!
 //! Fitness (paper, Eq. 1) is stored as the number of matches: bits that were predicted correctly
-//! one step earlier. A genome's fitness is the smallest over its repetitions.
+//! one step earlier. A genome's fitness is that of its worst repetition.
 
 use crate::metrics::{Measures, Motion};
 use crate::scenario::{Scenario, Trial};

@@ -4,9 +4,10 @@
 //! The noise is counter-based: the flips of a robot in a step are a function of run seed,
 //! generation, repetition, step and robot. The ChaCha8 key encodes the first three (see
 //! [`seed`](crate::seed)), the ChaCha stream number is the step, and the words of robot n start at
-//! word 8·n. They are sixteen 16-bit draws; sensor k uses draw k (low half of a word first) and
-//! flips if the draw is below the rate. Draws without a sensor flip nothing. So the noise does not
-//! depend on engine, order or thread, and all genomes of a generation get the same noise.
+//! word 8·n. They are sixteen 16-bit draws; sensor k uses draw k (low half of a word first), and
+//! its bit is flipped if the draw is below the rate. Draws without a sensor flip nothing. So the
+//! noise does not depend on engine, order or thread, and all genomes of a generation get the same
+//! noise.
 
 use crate::seed::Stream;
 use minimal_surprise_controller::SensorBits;

@@ -3,7 +3,7 @@
 //! In a step, every robot senses the occupancy at time t; then each robot, in index order, decides
 //! and acts. A robot going straight moves if the cell ahead was empty at time t and no robot with a
 //! lower index has taken it; a cell vacated in this step is still blocked. Noise affects only the
-//! readings of a robot, not its freedom to move.
+//! readings of a robot, not its ability to move.
 
 use crate::noise::NoiseStream;
 use crate::torus::{Grid, Heading, Pose};
@@ -47,8 +47,8 @@ pub enum WorldError {
 /// Checks that every robot is on the grid and no two share a cell.
 ///
 /// # Errors
-/// [`WorldError`] if a robot is outside the grid or two share a cell; it describes the first such
-/// robot.
+/// [`WorldError`] if a robot is outside the grid or two share a cell; the error describes the first
+/// such robot.
 pub fn check_poses(grid: Grid, poses: &[Pose]) -> Result<(), WorldError> {
     // Memory and time depend only on the number of robots: a file with few robots may specify any
     // grid size.

@@ -125,7 +125,7 @@ function makeChoices() {
     element(key).parentElement.hidden = values.length < 2;
   }
   for (const key of [...CHOICES, 'sort']) element(key).addEventListener('change', (event) => choose(key, event.target.value));
-  // The choices are in the address, so that going back from a replay restores them.
+  // The choices are stored in the address, so that going back from a replay restores them.
   const given = new URLSearchParams(location.hash.slice(1));
   for (const key of CHOICES) {
     if ([...element(key).options].some(({ value }) => value === given.get(key))) chosen[key] = given.get(key);

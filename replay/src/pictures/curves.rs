@@ -19,7 +19,7 @@ use std::convert::Infallible;
 /// Ratio of a curve's height to its width.
 const SHAPE: f64 = 0.56;
 
-/// Number of integer coordinates (which plotters uses) per millimetre or pixel.
+/// Number of integer coordinates of the crate plotters per millimetre or pixel.
 const FINE: f64 = 100.0;
 
 /// Width of a curve on a screen, in pixels.

@@ -185,7 +185,7 @@ fn layout(
     }
 }
 
-/// Returns the columns of the widest panel and the rows of the highest.
+/// Returns the columns of the widest panel and the rows of the tallest.
 fn cells(panels: &[Panel]) -> (f64, f64) {
     let most = |of: fn(&Scene) -> u16| {
         let sides = panels.iter().map(|panel| f64::from(of(&panel.scene)));

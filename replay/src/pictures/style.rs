@@ -44,7 +44,7 @@ pub enum PictureError {
         "a trajectory has poses only; give a run or a genome to show what robots sense and predict"
     )]
     NoController,
-    /// The recording does not come from a run directory, so no evolution is known.
+    /// The recording does not come from a run directory, so its evolution is unknown.
     #[error("only a run directory records how fitness evolved")]
     NoEvolution,
     /// The swarm was not damaged.

@@ -1,5 +1,5 @@
 //! Structures that a swarm has formed (paper, Sec. 2.2), on any torus, for any number of robots, in
-//! time linear in cells and robots.
+//! time linear in the numbers of cells and robots.
 //!
 //! A robot may belong to several structures. A run is named after the structure with the most
 //! robots.
@@ -112,8 +112,8 @@ impl Membership {
 
 impl Structure {
     /// Returns the condition used to measure the similarity to an earlier state. Triangular
-    /// lattices are compared by cells, because their robots keep turning, all other structures by
-    /// poses (paper, Sec. 3.4).
+    /// lattices are compared by cells, because their robots keep turning; all other structures are
+    /// compared by poses (paper, Sec. 3.4).
     #[must_use]
     pub fn matching(self) -> Match {
         match self {
@@ -307,8 +307,8 @@ impl Structures {
     }
 
     /// Returns the structures that the run is named after: those with the most robots, usually one.
-    /// If k structures are tied, the run counts 1/k for each; empty if no robot is in any
-    /// structure.
+    /// If k structures are tied, the run counts 1/k for each; the list is empty if no robot is in
+    /// any structure.
     #[must_use]
     pub fn names(&self) -> Vec<Structure> {
         let counts = Structure::ALL.map(|structure| (structure, self.count(structure)));

@@ -194,7 +194,7 @@ impl<const N: usize> LinesInRegisters<N> {
         let side = _mm_cvtsi32_si128(plane.side() as i32);
         core::array::from_fn(|row| {
             core::array::from_fn(|n| {
-                // SAFETY: 16 words are read, starting at index 2 + 16 at most.
+                // SAFETY: 16 words are read, starting no later than at index 2 + 16.
                 let own = unsafe { _mm512_loadu_si512(padded.as_ptr().add(row + 16 * n).cast()) };
                 let line = _mm512_or_si512(
                     own,
