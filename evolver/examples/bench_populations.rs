@@ -1,4 +1,4 @@
-//! Generates the populations that `evolver bench` measures: from default evolutions with seed 1.
+//! Generates the populations that `evolver bench` measures, from default evolutions with seed 1.
 //!
 //! `cargo run --release -p minimal-surprise-evolver --example bench_populations`
 

@@ -11,7 +11,8 @@ pub enum Exit {
     Failure = 1,
     /// The input is invalid; nothing was written.
     BadInput = 2,
-    /// Some of the requested work is not done; nothing is lost, and the printed command continues.
+    /// Some of the requested work is not done; nothing is lost, and the printed command continues
+    /// the work.
     Unfinished = 3,
     /// Ended by Ctrl-C or another signal; nothing is lost.
     Interrupted = 130,

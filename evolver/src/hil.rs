@@ -1,10 +1,10 @@
 //! Hardware in the loop: a simulated swarm whose robot 0 may be a real robot.
 //!
-//! The hash of a run is the SHA-256 of a fixed text; the number of robots in 64 bits; their
+//! The hash of a run is the SHA-256 of a fixed text; the number of robots in 64 bits; the robots'
 //! starting poses; for every step and every robot, its reading in 16 bits, action and turn in 8
-//! bits each, prediction in 16 bits, and pose after the step; and at the end, robot 0's
-//! mispredicted and seen bits in 64 bits each. A pose is x and y in 16 bits each and the heading
-//! in 8. All little-endian.
+//! bits each, prediction in 16 bits, and pose after the step; and at the end, the numbers of robot
+//! 0's mispredicted and seen bits in 64 bits each. A pose is x and y in 16 bits each and the
+//! heading in 8 bits. All numbers are little-endian.
 
 use minimal_surprise_controller::{Controller, Decision, SensorBits, State, Surprise};
 use minimal_surprise_evolution::text::hex;
@@ -38,7 +38,7 @@ pub struct HilRun {
     pub surprise: Surprise,
 }
 
-/// The hash of everything that happened in a run.
+/// The hash of all events in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HilHash([u8; 32]);
 
@@ -48,7 +48,7 @@ impl fmt::Display for HilHash {
     }
 }
 
-/// The error that ended a run with a real robot early.
+/// An error that ended a run with a real robot early.
 #[derive(Debug, thiserror::Error)]
 pub enum HilError<E> {
     /// Starting poses that do not fit the grid.

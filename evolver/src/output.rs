@@ -15,7 +15,8 @@ use std::fmt::Arguments;
 use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::sync::{LazyLock, OnceLock};
 
-/// True if standard output is a terminal; checked at the start, since it may be closed later.
+/// True if standard output is a terminal; checked at startup, since standard output may be closed
+/// later.
 static STDOUT_IS_TERMINAL: LazyLock<bool> = LazyLock::new(|| stdout().is_terminal());
 static STDERR_IS_TERMINAL: LazyLock<bool> = LazyLock::new(|| stderr().is_terminal());
 static LOCALE_IS_UTF8: LazyLock<bool> = LazyLock::new(locale_is_utf8);
@@ -66,7 +67,7 @@ fn locale_is_utf8() -> bool {
     cfg!(windows) || locale.contains("utf-8") || locale.contains("utf8")
 }
 
-/// Returns the text in the characters that standard error can display.
+/// Converts the text to characters that standard error can display.
 pub(crate) fn for_stderr(text: &str) -> Cow<'_, str> {
     if stderr_is_ascii() {
         ascii(text).into()
@@ -125,7 +126,8 @@ pub(crate) fn lost() -> Option<&'static io::Error> {
     LOST.get()
 }
 
-/// Returns whether standard output was closed by its reader; on a terminal, any error means that.
+/// Returns whether the reader of standard output has closed it; on a terminal, any error means
+/// this.
 pub(crate) fn is_gone(error: &io::Error) -> bool {
     error.kind() == ErrorKind::BrokenPipe || *STDOUT_IS_TERMINAL
 }

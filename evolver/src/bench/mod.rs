@@ -42,7 +42,7 @@ pub struct Report {
 /// Repetitions and steps of an evaluation, as in the paper.
 const REPETITIONS: u32 = 10;
 const STEPS: u32 = 500;
-/// Sensor noise in the measurement with noise.
+/// Level of sensor noise in the measurement with noise.
 const NOISE: f64 = 0.1;
 /// Minimum duration of a measurement, in CPU-seconds.
 const SECONDS_MIN: f64 = 1.5;
@@ -196,12 +196,12 @@ fn threads_2_efficiency() -> io::Result<f64> {
         second.wait()?;
         apart += watch.elapsed().as_secs_f64();
     }
-    // One evolution takes `together` seconds, two take `apart` seconds.
+    // One evolution takes `together` seconds; two in parallel take `apart` seconds.
     Ok(apart / 2.0 / together)
 }
 
-/// Measures the memory of a default evolution; a few generations are enough, since memory does not
-/// grow with their number.
+/// Measures the memory use of a default evolution; a few generations are enough, since memory use
+/// does not grow with the number of generations.
 fn peak_rss_mb() -> io::Result<Option<f64>> {
     let folder = tempfile::tempdir()?;
     evolution(&folder, "memory", &["--generations", "10"])?.wait()?;

@@ -41,7 +41,7 @@ pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Reads the last state in a file; recognises the format by the first characters.
+/// Reads the last state in a file; recognises the format by the file's first characters.
 fn read_state(path: &Path) -> anyhow::Result<(Grid, Vec<Pose>)> {
     let bytes = files::read(path, DATA_BYTES_MAX).map_err(unusable)?;
     let text = text::decode(&bytes).map_err(|error| {

@@ -52,7 +52,8 @@ pub struct DamageArgs {
 /// Damages the final state of a run.
 ///
 /// # Errors
-/// [`BadInput`] if the run or a flag is invalid; the message lists the valid values.
+/// [`BadInput`] if the run or a flag is invalid, or memory is insufficient; the message describes
+/// the valid values.
 pub fn damage(arguments: &DamageArgs) -> anyhow::Result<()> {
     let finished = FinishedRun::read_and_check(&arguments.run).map_err(unusable)?;
     let grid = finished.settings.scenario().grid();

@@ -52,7 +52,7 @@ pub fn exit_of(error: &anyhow::Error) -> Exit {
     }
 }
 
-/// Reports why work stopped early, and the command that continues it.
+/// Reports why work stopped early and which command continues it.
 pub(super) fn stopped(resume: &str) -> anyhow::Result<Exit> {
     match output::lost() {
         None => {
@@ -90,7 +90,7 @@ pub(super) fn name_damaged(damaged: &DamagedRuns, again: Option<&str>) -> Exit {
 
 /// An error about an input that the user named.
 pub(super) trait AboutInput: std::error::Error + Send + Sync + Sized + 'static {
-    /// Returns whether the input is invalid; otherwise the error is a failure.
+    /// Returns whether the error is about invalid input; otherwise it is a failure.
     fn is_bad_input(&self) -> bool;
 }
 
@@ -126,7 +126,7 @@ impl AboutInput for ReadRunError {
             // If a file other than the mark is missing, the run is marked complete but damaged.
             Self::NotComplete { missing, .. } => *missing == DONE,
             Self::NotThere(error) => error.is_bad_input(),
-            // The mark is read first. A directory or a pipe in its place counts as damage.
+            // The mark is read first. If it is a directory or a pipe, that counts as damage.
             Self::File(error) => {
                 let damage = [ErrorKind::IsADirectory, ErrorKind::InvalidInput];
                 let is_damage = damage.contains(&error.error.kind());
@@ -216,7 +216,7 @@ mod tests {
                 let error = FileError::at(&Path::new("run").join(name))(kind.into());
                 exit_of(&unusable(ReadRunError::File(error)))
             };
-            // A directory in the place of the mark counts as damage.
+            // A directory instead of the mark counts as damage.
             let of_mark = match kind {
                 ErrorKind::IsADirectory => Exit::Failure,
                 _ => exit,

@@ -55,7 +55,8 @@ pub struct EvaluateArgs {
 /// Evaluates a genome.
 ///
 /// # Errors
-/// [`BadInput`] if the genome or a flag is invalid; the message lists the valid values.
+/// [`BadInput`] if the genome or a flag is invalid, or memory is insufficient; the message
+/// describes the valid values.
 pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     let file = genome_file(&arguments.genome);
     let genome = read_genome(&arguments.genome)?;

@@ -81,8 +81,8 @@ struct RunOptions {
 /// Evolves a swarm.
 ///
 /// # Errors
-/// [`BadInput`] if a setting is invalid; nothing has been written then. After other errors the run
-/// can be resumed.
+/// [`BadInput`] if a setting is invalid, the run cannot be resumed, or memory or disk space is
+/// insufficient; in these cases, nothing is written. After other errors, the run can be resumed.
 pub fn evolve(arguments: &EvolveArgs) -> anyhow::Result<Exit> {
     let given = arguments.given().map_err(unusable)?;
     let threads = given.threads().map_err(BadInput::new)?;

@@ -76,13 +76,14 @@ pub enum Format {
 /// Exports a genome or a run.
 ///
 /// # Errors
-/// [`BadInput`] if the genome or run cannot be read, or the output file already exists.
+/// [`BadInput`] if a flag is invalid, the genome or run cannot be read, the output file already
+/// exists, or memory or disk space is insufficient.
 pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
     if arguments.name.is_some() && !matches!(arguments.format, Format::C | Format::Rust) {
         return Err(BadInput::new("--name requires --format c or --format rust").into());
     }
     let address = flag("address", &arguments.address, memory_address)?;
-    // The limit leaves enough numbers for all later updates over the serial line.
+    // The limit leaves enough write counts for all later updates over the serial line.
     let write_count = flag("write-count", &arguments.write_count, |text| {
         count(text, MADE_WRITE_COUNT_MAX)
     })?;
@@ -178,7 +179,7 @@ fn symbol(arguments: &ExportArgs, container: &[u8]) -> Result<String, BadInput> 
             checked.map(str::to_owned).map_err(str::to_owned)
         });
     }
-    // Name a run's genome after the run.
+    // The genome of a run is named after the run.
     let file = genome_file(&arguments.from);
     let file = file.canonicalize().unwrap_or(file);
     let stem = file.file_stem().filter(|stem| *stem != "best");

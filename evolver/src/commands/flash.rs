@@ -21,8 +21,8 @@ pub struct FlashArgs {
 /// Writes a genome to the robot on a port and starts the robot.
 ///
 /// # Errors
-/// If the genome is invalid, the robot cannot be reached, or the robot fails. The robot switches
-/// genomes only when the new genome is complete.
+/// If the genome is invalid, the robot cannot be reached, or the robot fails. The robot switches to
+/// the new genome only after receiving all of it.
 pub fn flash(arguments: &FlashArgs) -> anyhow::Result<()> {
     let genome = read_genome(&arguments.genome)?;
     let container = genome.bytes();

@@ -36,8 +36,9 @@ pub struct HilArgs {
 /// Runs a swarm whose robot 0 is on the line, and compares the result with the simulation.
 ///
 /// # Errors
-/// [`BadInput`] if the run cannot be read, the robot cannot be reached, or the robot runs a
-/// different genome.
+/// [`BadInput`] if the run cannot be read, memory is insufficient, the robot cannot be reached, or
+/// the robot runs a different genome. Other errors if the robot has a different kernel or fails
+/// during the run.
 pub fn hil(arguments: &HilArgs) -> anyhow::Result<Exit> {
     let (course, genome) = if arguments.run.is_dir() {
         of_run(arguments)?
@@ -101,7 +102,7 @@ fn of_run(arguments: &HilArgs) -> anyhow::Result<(HilTrial, PathBuf)> {
     Ok((course, directory.join(BEST)))
 }
 
-/// Creates the trial defined by the flags, which is the first trial of the seed.
+/// Creates the trial defined by the flags: the first trial of the seed.
 fn of_genome(arguments: &HilArgs) -> anyhow::Result<(HilTrial, PathBuf)> {
     let genome = read_genome(&arguments.run)?;
     let settings = arguments.conditions.settings(&genome)?;

@@ -119,8 +119,8 @@ fn read(path: &Path, only: Option<u32>) -> anyhow::Result<Vec<(u32, GenomeRows)>
     }
 }
 
-/// Determines the topology from the flags and, if they do not specify it, from the row length
-/// including padding.
+/// Determines the topology from the flags. If they do not specify it, determines it from the row
+/// length, including padding.
 fn topology(arguments: &ImportArgs, action: &[(u32, GenomeRows)]) -> Result<Topology, BadInput> {
     let length = action.first().map_or(0, |(_, rows)| rows.rows[0].len());
     let mut given = Overrides::default();

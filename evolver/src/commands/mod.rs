@@ -68,7 +68,7 @@ fn genome_file(path: &Path) -> PathBuf {
 /// Reads a genome file, or the best genome of a run directory.
 fn read_genome(path: &Path) -> anyhow::Result<GenomeFile> {
     if path.is_dir() {
-        // Without its mark the run is incomplete; with it, the run is damaged.
+        // Without its completion mark, the run is incomplete; with the mark, the run is damaged.
         require(path, BEST)
             .or_else(|error| require(path, DONE).and(Err(error)))
             .map_err(unusable)?;

@@ -33,7 +33,7 @@ pub struct MonitorArgs {
 /// # Errors
 /// If the robot cannot be reached, disconnects, or reports impossible values.
 pub fn monitor(arguments: &MonitorArgs) -> anyhow::Result<Exit> {
-    // Without a time limit, an interruption is the normal end.
+    // If no time limit is set, an interruption is the normal end.
     let (seconds, interrupted) = match &arguments.seconds {
         None => (u32::MAX, Exit::Done),
         Some(text) => {

@@ -38,7 +38,7 @@ impl PortArgs {
         PortName(self.port.clone())
     }
 
-    /// Checks the flags and connects. Afterwards, the first signal stops the work with the robot
+    /// Checks the flags and connects. After that, the first signal stops the work with the robot,
     /// and the second exits immediately.
     pub(super) fn connect(&self) -> anyhow::Result<Robot> {
         let baud = flag("baud", &self.baud, |text| count(text, 12_000_000))?;
@@ -55,7 +55,7 @@ impl PortArgs {
         Ok(robot)
     }
 
-    /// Returns the command line of a different command on the same port.
+    /// Returns the command line of another command for the same port.
     pub(super) fn command(&self, command: &str) -> String {
         let port = shell_path(&self.port);
         let line = format!("{} {command} --port {port}", program());

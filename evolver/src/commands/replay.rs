@@ -80,7 +80,8 @@ pub struct ReplayArgs {
 /// Shows a run.
 ///
 /// # Errors
-/// [`BadInput`] if the run cannot be read, has no steps, or a flag is invalid.
+/// [`BadInput`] if the run cannot be read, the run has no steps, a flag is invalid, or memory is
+/// insufficient.
 pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<Exit> {
     let overwrite = arguments.overwrite;
     let existing = Existing::with_overwrite(overwrite);
@@ -107,7 +108,8 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<Exit> {
             .pictures
             .write(&recording, arguments.colour, existing)?;
     } else if arguments.html.is_none() {
-        // In the terminal, Ctrl-C is read as a key; this handles signals from other processes.
+        // In the terminal, Ctrl-C is read as a key; this flag is set by signals from other
+        // processes.
         on_signal(ask_to_stop)?;
         return in_terminal(&recording, arguments.colour, stop());
     }
@@ -229,8 +231,8 @@ fn of_run(
     .map_err(|error| about(&error))
 }
 
-/// Rejects a recording that does not fit in this machine's memory or on a page, before any step is
-/// computed.
+/// Rejects a recording that does not fit in this machine's memory or on a page; called before any
+/// step is computed.
 fn check_size(arguments: &ReplayArgs, scenario: &Scenario) -> Result<(), BadInput> {
     let needs = Needs::of_recording(scenario);
     needs.check_memory().map_err(BadInput::new)?;

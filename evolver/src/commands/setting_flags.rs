@@ -55,7 +55,8 @@ impl Args for SettingFlags {
     fn augment_args(command: Command) -> Command {
         command.args(SETTINGS.iter().map(|setting| {
             let arg = arg(setting, with_default(setting.meaning(), setting.default));
-            // A run is resumed with its own settings, on any number of threads.
+            // A run is always resumed with its recorded settings; only the number of threads may
+            // differ.
             match setting.name {
                 "threads" => arg,
                 _ => arg.conflicts_with("resume"),
@@ -79,7 +80,7 @@ impl FromArgMatches for SettingFlags {
     }
 }
 
-/// Settings needed to run a genome that its file does not contain.
+/// Settings that are needed to run a genome but are not in its file.
 const CONDITIONS: [&str; 5] = ["grid", "robots", "steps", "noise", "seed"];
 
 fn conditions() -> impl Iterator<Item = &'static Setting> {
@@ -126,7 +127,7 @@ impl FromArgMatches for GenomeConditions {
 }
 
 impl GenomeConditions {
-    /// Rejects these flags for a file that already records the conditions.
+    /// Rejects these flags if the file already records the conditions.
     ///
     /// # Errors
     /// [`BadInput`] if a flag was given.

@@ -1,4 +1,4 @@
-//! Genomes as source code, to link into firmware, and as images, to write to a chip.
+//! Genomes as source code that is linked into firmware, and as images that are written to a chip.
 
 use crate::robot::length_and_crc;
 use ihex::{Record, create_object_file_representation};
@@ -23,7 +23,7 @@ pub fn symbol(name: &str, container: &[u8]) -> String {
 #[must_use]
 pub fn c_header(genome: &GenomeFile, symbol: &str) -> String {
     let container = genome.bytes();
-    // Keep the case, since names that differ only in case are different.
+    // Keep upper and lower case, since names that differ only in case are different.
     let guard = format!("{symbol}_INCLUDED");
     format!(
         "/* A minimal-surprise genome: {}. */\n\
@@ -95,7 +95,7 @@ pub fn intel_hex(container: &[u8], address: u32) -> Option<String> {
 /// The robot uses the slot with the larger `write_count`, which is 1 or more.
 ///
 /// # Panics
-/// If `container` is not longer than four bytes or not shorter than 64 KiB.
+/// If `container` has at most four bytes, or 64 KiB or more.
 #[must_use]
 pub fn slot(container: &[u8], write_count: u32) -> Vec<u8> {
     let (length, crc) = length_and_crc(container).expect("a container has a CRC");

@@ -9,8 +9,8 @@ use minimal_surprise_sim::{Grid, Pose};
 const WITHOUT_TERMINAL: (u16, u16) = (60, 120);
 
 /// Draws the swarm, two columns per cell: members as filled arrows (coloured on a terminal), the
-/// others hollow. In ASCII, where both would look the same, members have a star. If the picture
-/// does not fit, returns a note instead.
+/// others hollow. In ASCII, members are marked with a star, since all arrows look the same. If the
+/// picture does not fit, returns a note instead.
 #[must_use]
 pub fn picture(grid: Grid, poses: &[Pose], is_member: impl Fn(u32) -> bool) -> String {
     let (rows, columns) = Term::stdout().size_checked().unwrap_or(WITHOUT_TERMINAL);

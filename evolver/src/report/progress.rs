@@ -9,7 +9,7 @@ use minimal_surprise_evolution::settings::Settings;
 use minimal_surprise_sim::Scenario;
 use std::time::{Duration, Instant};
 
-/// Minimum number of columns of a terminal for a bar beside the numbers.
+/// Minimum number of terminal columns for a bar beside the numbers.
 const COLUMNS_FOR_BAR: u16 = 40;
 
 /// Display of the progress.
@@ -63,7 +63,7 @@ impl Shown {
     }
 }
 
-/// Number of robot-steps above which computing a run takes seconds.
+/// Number of robot-steps above which the computation of a run takes seconds.
 const LONG_ROBOT_STEPS: u64 = 2_000_000;
 
 /// Computes a run, and shows its progress if it takes seconds; `compute` receives a callback to
@@ -113,7 +113,7 @@ pub(crate) fn bar(bar: ProgressBar, numbers: &str) -> ProgressBar {
 }
 
 impl Progress {
-    /// Starts the display and its clock; `done` generations were completed before.
+    /// Starts the display and its clock; `done` is the number of generations completed before.
     #[must_use]
     pub fn start(mode: ProgressMode, settings: &Settings, done: u32) -> Self {
         let bar = || ProgressBar::new(settings.generations().into()).with_position(done.into());

@@ -38,7 +38,7 @@ fn fitnesses(reruns: &[Rerun]) -> Vec<f64> {
     reruns.iter().map(|rerun| rerun.fitness).collect()
 }
 
-/// Returns the orientation of lines in most runs; an empty text if no run has lines.
+/// Returns the most frequent orientation of lines; an empty text if no run has lines.
 fn orientation(reruns: &[Rerun]) -> String {
     if !reruns.iter().any(|r| r.names.contains(&Structure::Line)) {
         return String::new();
@@ -131,7 +131,7 @@ pub fn conditions_json(conditions: &[Condition], seed: u64) -> Value {
     object
 }
 
-/// Formats rows of Tables 7 and 8: the mean, and for several runs the median in brackets.
+/// Formats rows of Tables 7 and 8: the mean and, if there are several runs, the median in brackets.
 #[must_use]
 pub fn resilience_text(structure: Structure, rows: &[ResilienceRow]) -> String {
     let mut table = super::table(&[

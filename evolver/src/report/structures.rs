@@ -8,7 +8,7 @@ use minimal_surprise_sim::{Grid, Pose};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
-/// A state, its structures and, if the run is known, its measures.
+/// A state, its structures and, if the run is known, the run's measures.
 #[derive(Clone, Copy, Debug)]
 pub struct Classified<'a> {
     /// The grid.

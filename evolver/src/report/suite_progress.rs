@@ -24,12 +24,12 @@ pub struct SuiteProgress<'a> {
     worked: Cell<u64>,
     /// Number of remaining robot-steps.
     left: Cell<u64>,
-    /// ID of the current run, and its number of robot-steps already subtracted from `left`.
+    /// ID of the current run, and the number of its robot-steps already subtracted from `left`.
     settled: RefCell<(String, u64)>,
 }
 
 impl<'a> SuiteProgress<'a> {
-    /// Starts the display and its clock; of `runs` runs, `waiting` are still to be executed and
+    /// Starts the display and its clock. Of `runs` runs, `waiting` must still be executed; they
     /// need `left` robot-steps.
     #[must_use]
     pub fn start(mode: ProgressMode, plan: &'a Plan, runs: u64, waiting: u64, left: u64) -> Self {
@@ -63,7 +63,7 @@ impl<'a> SuiteProgress<'a> {
         self.left().map_or_else(String::new, words)
     }
 
-    /// Estimates the remaining time; `None` before this process has completed a generation, or if
+    /// Estimates the remaining time; `None` if this process has not completed a generation yet or
     /// the time overflows a [`Duration`].
     fn left(&self) -> Option<Duration> {
         let left = self.started.elapsed().as_secs_f64() * self.share_left()?;
@@ -154,7 +154,7 @@ impl Watch for SuiteProgress<'_> {
     }
 }
 
-/// Display of the progress of runs beyond a plan, whose number is not known in advance.
+/// Progress display for runs beyond a plan; their number is not known in advance.
 #[derive(Debug)]
 pub struct SearchProgress {
     shown: Shown,
@@ -162,7 +162,7 @@ pub struct SearchProgress {
 }
 
 impl SearchProgress {
-    /// Starts the display for the experiment that searches.
+    /// Starts the display for a search; `experiment` is the experiment that needs the structure.
     #[must_use]
     pub fn start(mode: ProgressMode, experiment: &str) -> Self {
         let prefix = for_stderr(experiment).into_owned();

@@ -12,7 +12,7 @@ pub struct RobotError {
     pub port: PortName,
     /// The problem.
     pub problem: Problem,
-    /// The robot's state and advice for the user, if the command has changed the state.
+    /// The robot's state and advice for the user; empty if the command has not changed the state.
     pub left: Option<String>,
 }
 
@@ -128,7 +128,7 @@ pub enum Problem {
     },
 }
 
-/// End of a message about a robot that has not replied yet.
+/// End of a message about a robot that has never replied.
 const RESTARTS: &str =
     "; a board that restarts when its port is opened may need a longer wait, such as --wait 10";
 
@@ -150,7 +150,7 @@ impl std::fmt::Display for OtherReader {
     }
 }
 
-/// The request that a robot is executing.
+/// The work that a robot is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doing {
     /// Identify itself.
@@ -168,7 +168,7 @@ pub enum Doing {
 }
 
 impl Doing {
-    /// Returns the consequence for the robot, or an empty text if it is obvious.
+    /// Returns the consequence for the robot; an empty text if the consequence is obvious.
     fn consequence(self) -> &'static str {
         match self {
             Self::Receiving => "; it keeps its old genome",
@@ -179,9 +179,9 @@ impl Doing {
         }
     }
 
-    /// Returns the consequence of a rejected request. A rejected genome is not in use. But after a
-    /// lost session, the request may have been executed already; and if the flash could not be
-    /// read, the robot may run the new genome after a restart.
+    /// Returns the consequence of a rejected request. A rejected genome is not in use. However, if
+    /// the session was lost, the request may already have been executed; and if the flash could not
+    /// be read, the robot may run the new genome after a restart.
     fn consequence_of(self, refusal: Refusal) -> &'static str {
         match (self, refusal) {
             (Self::Committing, Refusal::NoSession | Refusal::Flash) => self.consequence(),
@@ -216,7 +216,7 @@ pub enum Heard {
     },
     /// Frames that are not replies.
     Frames,
-    /// Bytes without a frame.
+    /// Bytes that are not frames.
     Bytes {
         /// Number of bytes.
         count: u64,

@@ -11,7 +11,7 @@ static STANDING: Mutex<Option<String>> = Mutex::new(None);
 pub enum Afterwards {
     /// Running if the work succeeded, otherwise unchanged.
     Runs,
-    /// Unchanged, except that the controller is reset because the work has used it.
+    /// Unchanged, but with the controller reset, because the work has used it.
     StartsAnew,
 }
 
@@ -51,7 +51,7 @@ impl Robot {
             held.runs = true;
         }
         if let Err(error) = held.put_back() {
-            // Report the first error, which caused the others.
+            // Report the first error, since it caused the others.
             let mut error = done.err().unwrap_or(error);
             error.left = held.runs.then(|| held.words.clone());
             done = Err(error);

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 /// Time limit for sending a request; at 9,600 baud the longest takes 160 ms.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
-/// Pause before retrying a port that reported that it was ready but was not.
+/// Pause before a retry if a port reported that it was ready but was not.
 const PAUSE: Duration = Duration::from_millis(1);
 
 /// A flag that is never set, for operations that must not be interrupted.
@@ -30,7 +30,7 @@ pub(super) struct Line {
     answered: bool,
     /// True if bytes had arrived but another program read them first.
     shared: bool,
-    /// Set to stop sending requests.
+    /// Flag that stops the sending of requests once it is set.
     stop: &'static AtomicBool,
 }
 
@@ -81,7 +81,7 @@ impl Line {
         })
     }
 
-    /// Ignores `stop` from this point.
+    /// Ignores `stop` after this call.
     pub(super) fn finish(&mut self) {
         self.stop = &NEVER;
     }
@@ -107,7 +107,7 @@ impl Line {
         let mut bytes = match self.client.request(request) {
             Ok(bytes) => bytes.to_vec(),
             // Unreachable in practice: requests are always completed, and a conversation allows
-            // more of them than any run needs.
+            // more requests than any run needs.
             Err(error) => {
                 let error = io::Error::other(error);
                 return Err(self.about(Problem::Broken { doing, error }));
@@ -214,7 +214,7 @@ impl Line {
         read.map_err(|error| self.broken(doing, error))
     }
 
-    /// Reads or writes as soon as possible; returns `None` at the deadline.
+    /// Reads or writes as soon as the port is ready; returns `None` at the deadline.
     fn by(
         &mut self,
         deadline: Instant,
@@ -250,13 +250,13 @@ fn is_not_ready(transferred: &io::Result<usize>) -> bool {
     }
 }
 
-/// Opens a port that waits only before a read or write, never during it. Otherwise, if another
-/// program took the byte that had arrived, the read would wait for the next one without a time
+/// Opens a port that waits only before a read or write, never during one. Otherwise, if another
+/// program took the byte that had arrived, the read would wait for the next byte without a time
 /// limit.
 #[cfg(unix)]
 fn open_port(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
     let port = serialport::new(name, baud).open_native()?;
-    // The flag belongs to the open file, which both descriptors share.
+    // The flag applies to the open file, which both descriptors share.
     let set = filedescriptor::FileDescriptor::dup(&port)
         .and_then(|mut duplicate| duplicate.set_non_blocking(true));
     match set {
@@ -268,7 +268,7 @@ fn open_port(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
     }
 }
 
-/// Returns whether this name exists and is not a terminal line.
+/// Returns whether this path exists and is not a terminal line.
 #[cfg(unix)]
 fn is_another_device(path: &Path) -> bool {
     use nix::libc::{O_NOCTTY, O_NONBLOCK};

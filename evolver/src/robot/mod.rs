@@ -65,7 +65,7 @@ pub fn describe(genome: GenomeInUse) -> String {
     }
 }
 
-/// Returns a description of each fault.
+/// Returns a description of each reported fault.
 #[must_use]
 pub fn fault_names(faults: Faults) -> Vec<&'static str> {
     let names = [
@@ -114,8 +114,8 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// Opens the port and asks the robot to identify itself, for up to `wait`. Once `stop` is set,
-    /// only the requests that restore the robot's state are sent.
+    /// Opens the port and asks the robot to identify itself; tries for up to `wait`. Once `stop` is
+    /// set, only the requests that restore the robot's state are sent.
     ///
     /// # Errors
     /// [`RobotError`] if the port does not exist, no device replies, or a different device replies.
@@ -135,7 +135,7 @@ impl Robot {
         })
     }
 
-    /// Ignores `stop` from this point.
+    /// Ignores `stop` after this call.
     fn finish(&mut self) {
         self.line.finish();
     }
@@ -175,8 +175,8 @@ impl Robot {
     /// until the genome is complete.
     ///
     /// # Errors
-    /// [`RobotError`] if the transfer fails. The robot then keeps its old genome, except after a
-    /// failure while [`Doing::Committing`], when it has either genome.
+    /// [`RobotError`] if the transfer fails. In that case, the robot keeps its old genome; after a
+    /// failure while [`Doing::Committing`], it has either the old or the new genome.
     pub fn write(
         &mut self,
         container: &[u8],
@@ -202,7 +202,7 @@ impl Robot {
                 _ => None,
             });
         match committed {
-            // The reply may have been lost, so ask the robot.
+            // The reply may have been lost, so ask the robot which genome it runs.
             Err(error) if matches!(error.problem, Problem::Unanswered { .. }) => {
                 self.identify().map_err(|_| error)?;
             }

@@ -1,17 +1,17 @@
 //! Checks that the values reported by a robot are possible, before they are used.
 //!
 //! Some values are not checked, since nothing is computed from them: the write count in the reply
-//! to a commit, after which the robot is asked for the genome in use; the counters of the line,
+//! to a commit, because the robot is then asked for the genome in use; the counters of the line,
 //! which can have any value and are shown unchanged; and the expected offset in the rejection of a
-//! chunk, which is shown in the message.
+//! chunk, which is only shown in the message.
 
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;
 use minimal_surprise_controller::{KERNEL_ID, Surprise};
 use minimal_surprise_link::{FIRMWARE_BYTES_MAX, GenomeInUse, Identity, Report, VERSION_BYTES_MAX};
 
-/// Maximum number of bits sensed in a step: the bits of one reading.
+/// Maximum number of bits sensed in a step: the number of bits in a reading.
 const BITS_A_STEP_MAX: u64 = u16::BITS as u64;
-/// Bytes of the CRC; a container is longer.
+/// Number of bytes in the CRC; every container is longer.
 const CRC_BYTES: u16 = 4;
 
 /// Rejects an impossible identity, with the reason.
@@ -36,7 +36,7 @@ pub(super) fn check_identity(identity: &Identity<'_>) -> Result<(), String> {
     else {
         return Ok(());
     };
-    // The length limit of a different kernel's genomes is unknown.
+    // The maximum genome length of a different kernel is unknown.
     let most = match identity.kernel {
         KERNEL_ID => CONTAINER_BYTES_MAX as u16,
         _ => u16::MAX,

@@ -1,6 +1,6 @@
 //! Jobs for a cluster. Each submission has a separate folder in the suite's directory, with copies
-//! of the program and the suite, so that later edits and submissions do not affect tasks that wait
-//! in the queue.
+//! of the program and the suite, so that later edits and submissions do not affect tasks waiting in
+//! the queue.
 
 use minimal_surprise_evolution::files::{self, FileError};
 use minimal_surprise_evolution::new_dir::{NewDir, remove_abandoned};
@@ -41,7 +41,7 @@ impl Job<'_> {
         free.expect("a free number exists")
     }
 
-    /// Returns the command of one task; `shard` is the task's index in shell syntax.
+    /// Returns the command for one task; `shard` is the task's index in shell syntax.
     pub(super) fn command(&self, folder: &Path, shard: &str) -> String {
         let flags = self
             .flags
@@ -58,7 +58,7 @@ impl Job<'_> {
         )
     }
 
-    /// Writes the files that the tasks need to the folder of a new submission.
+    /// Creates the folder of a new submission, and writes the files that the tasks need to it.
     pub(super) fn write(
         &self,
         suite_text: &str,

@@ -1,7 +1,7 @@
 //! Experiments of a suite: the table `[[experiment]]`, and its combinations of settings.
 //!
-//! In addition to its own keys, the table has a key for every setting that a suite may list, with
-//! one value or several.
+//! In addition to its own keys, the table has a key for every setting that a suite may list; its
+//! value is one value or a list.
 
 use minimal_surprise_controller::Prediction;
 use minimal_surprise_evolution::settings::{
@@ -12,7 +12,7 @@ use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Evolutions with every combination of the listed values of settings.
+/// Evolutions with every combination of the listed setting values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExperimentTable {
     /// Name of the experiment.
@@ -32,11 +32,11 @@ pub struct ExperimentTable {
 /// Name for predictions that are not fixed by a template.
 const FREE: &str = "free";
 
-/// Settings that labels handle separately.
+/// Settings that have a fixed place in labels.
 const LABELLED: [&str; 4] = ["grid", "robots", "sensor-model", "noise"];
 
 impl ExperimentTable {
-    /// Returns the listed settings with their values; the fastest varying comes first.
+    /// Returns the listed settings with their values; the one that varies fastest comes first.
     pub fn lists(&self) -> impl Iterator<Item = (&'static Setting, &[String])> {
         let first = ["noise", "robots", "grid", "sensor-model"];
         let others = self.values.keys().copied();

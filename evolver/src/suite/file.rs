@@ -16,7 +16,7 @@ pub const PAPER: &str = include_str!("paper.toml");
 pub struct Suite {
     /// Name of the suite.
     pub name: String,
-    /// Numbers to compare with in the report.
+    /// Source of the numbers that the report compares with.
     pub compare_with: Option<Reference>,
     /// Evolutions.
     #[serde(default, rename = "experiment")]
@@ -29,7 +29,7 @@ pub struct Suite {
     pub resiliences: Vec<Resilience>,
 }
 
-/// Source of numbers to compare with.
+/// Source of the numbers that the report compares with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reference {
@@ -49,7 +49,7 @@ pub struct Reevaluation {
     pub starts: u32,
 }
 
-/// A damage experiment on a structure that evolved in another experiment.
+/// A damage experiment on a structure that another experiment evolved.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Resilience {
@@ -61,18 +61,18 @@ pub struct Resilience {
     pub structure: String,
     /// Number of robots in each area.
     pub robots_in_areas: Vec<u32>,
-    /// Number of runs per row that involves random draws.
+    /// Number of runs for each row that involves random draws.
     pub repeat: u32,
-    /// Maximum number of further runs, evolved until one has the structure if no planned run has
-    /// it.
+    /// Maximum number of further runs: if no planned run has the structure, more runs are evolved
+    /// until one has it.
     #[serde(default)]
     pub further_runs: u32,
 }
 
-/// Maximum number of areas of a damage experiment: they are named A to Z.
+/// Maximum number of areas in a damage experiment, since areas are named A to Z.
 const AREAS_MAX: usize = 26;
 
-/// Maximum of every count in a suite, the same as on the command line.
+/// Maximum value of every count in a suite, the same as on the command line.
 const COUNT_MAX: u32 = 1_000_000;
 
 fn check_count(key: &str, value: u32) -> Result<(), String> {
@@ -119,7 +119,7 @@ fn check_of(of: &str, names: &[&str]) -> Result<(), String> {
 /// Maximum number of combinations of settings in a suite; each may have many runs.
 const COMBINATIONS_MAX: u64 = 1_000_000;
 
-/// Adds an experiment's combinations to the sum, and checks the sum.
+/// Adds the number of an experiment's combinations to the sum, and checks the sum.
 pub(super) fn check_combinations(
     experiment: &ExperimentTable,
     sum: &mut u64,
@@ -145,7 +145,7 @@ pub(super) fn check_seeds(first_seed: u64, runs: u32) -> Result<(), String> {
     }
 }
 
-/// Checks an experiment, and adds its combinations to the sum.
+/// Checks an experiment, and adds the number of its combinations to the sum.
 fn check_experiment(experiment: &ExperimentTable, combinations: &mut u64) -> Result<(), String> {
     check_name(&experiment.name)?;
     check_count("runs", experiment.runs)?;

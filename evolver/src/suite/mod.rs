@@ -1,8 +1,8 @@
 //! Suites: many evolutions described as data, including the paper's.
 //!
 //! A suite is a TOML file. Every combination of an experiment's listed values is run `runs` times.
-//! [`plan`] converts a suite to named runs, [`work`] executes one run, [`worker`] executes all runs
-//! that are not complete, [`search`] evolves further seeds until a wanted structure forms, and
+//! [`plan`] converts a suite into named runs, [`work`] executes one run, [`worker`] executes all
+//! runs that are not complete, [`search`] evolves further seeds until a wanted structure forms, and
 //! [`status`] counts the completed runs.
 //!
 //! ```toml

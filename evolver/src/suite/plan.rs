@@ -1,12 +1,12 @@
 //! Plans: the runs of a suite, each named by a hash of its inputs.
 //!
 //! A run's ID is a hash of everything that the run's result depends on: the kernel, the version of
-//! the evolution, and the resolved settings including the seed. Finished runs are therefore found
-//! reliably, and experiments that include the same run share it.
+//! the evolution, and the resolved settings including the seed. Finished runs are therefore
+//! recognised reliably, and experiments that include the same run share it.
 //!
-//! A plan does not store its runs. It stores the order of the settings, and for each the seeds that
-//! no earlier equal settings have. Runs are created one at a time on request, so that a plan of a
-//! million runs, or a share of it, takes no more memory than a plan of ten.
+//! A plan does not store its runs. It stores the settings in order, each with the seeds that were
+//! not already listed for the same settings. Runs are created one at a time on request, so that a
+//! plan of a million runs, or a share of it, takes no more memory than a plan of ten.
 
 use super::experiment::ExperimentTable;
 use super::file::{Suite, check_combinations, check_seeds};
@@ -32,7 +32,7 @@ pub struct Plan {
 #[derive(Clone, Copy, Debug)]
 struct SeedRange {
     experiment: u32,
-    /// Index of the settings among the experiment's combinations.
+    /// Index of this combination of settings in the experiment.
     combination: u32,
     /// Index of the first run, counted from the experiment's first seed.
     first: u32,
@@ -121,8 +121,8 @@ impl PlannedExperiment {
         }
     }
 
-    /// Returns the runs beyond the plan: of all settings in turn, with the seeds after the planned
-    /// ones.
+    /// Returns the runs beyond the plan: one run of each combination of settings in turn, with the
+    /// seeds that follow the planned ones.
     pub fn further(&self) -> impl Iterator<Item = PlannedRun> {
         (0..u64::from(u32::MAX)).flat_map(|round| {
             self.settings()
@@ -227,7 +227,7 @@ pub enum PlanError {
         /// The existing names.
         names: Vec<String>,
     },
-    /// The seeds exceed the maximum, or the combinations are too many.
+    /// A seed exceeds the maximum, or there are too many combinations.
     #[error("experiment {experiment:?}: {problem}")]
     Experiment {
         /// The experiment.
@@ -330,7 +330,7 @@ fn different(experiments: &[PlannedExperiment]) -> Result<Vec<SeedRange>, Settin
     let mut names = Vec::new();
     for experiment in experiments {
         for combination in 0..experiment.asked.combinations() {
-            // Compare the settings without their seed.
+            // Compare the settings, ignoring their seeds.
             let settings = experiment.asked.settings(combination)?.with_seed(0);
             names.push((run_id(&settings), ranges.len()));
             ranges.push(SeedRange {
@@ -342,7 +342,8 @@ fn different(experiments: &[PlannedExperiment]) -> Result<Vec<SeedRange>, Settin
         }
     }
     names.sort_unstable();
-    // For ranges whose settings occur several times: the seeds that no earlier range has.
+    // If settings occur in several ranges, each range keeps only the seeds that no earlier range
+    // has.
     let mut cut: BTreeMap<usize, Vec<SeedRange>> = BTreeMap::new();
     for same in names.chunk_by(|one, next| one.0 == next.0) {
         let mut before: Vec<Range<u64>> = Vec::new();

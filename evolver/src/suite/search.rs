@@ -1,9 +1,10 @@
 //! Searches: evolution of further seeds until a run has the structure that a damage experiment
 //! needs.
 //!
-//! The planned runs of the experiment come first. If the structure dominates none of them, further
-//! seeds are run, of all settings in turn, until it dominates a run. The number of that run in this
-//! order is the number of runs needed, regardless of which processes executed them.
+//! The planned runs of the experiment come first. If the structure dominates none of them, runs
+//! with further seeds are executed, of all settings in turn, until the structure dominates a run.
+//! The position of that run in this order is the number of runs needed; it does not depend on which
+//! processes executed the runs.
 
 use super::file::Resilience;
 use super::plan::{Plan, PlannedRun};
@@ -22,12 +23,13 @@ pub enum Search {
     Next(Box<PlannedRun>, u32),
     /// The run that has the structure: run *k* beyond the plan, counted from 1.
     Found(Box<PlannedRun>, u32),
-    /// The maximum number of further runs, given here, is complete; none has the structure.
+    /// All further runs are complete, and none has the structure; the value is their maximum
+    /// number.
     NotFound(u32),
 }
 
 /// Searches the runs of a suite in its directory. Skips the first `after` runs beyond the plan,
-/// which are known not to have the structure. A damaged run counts as incomplete.
+/// because they are known not to have the structure. A damaged run counts as incomplete.
 pub fn look(
     plan: &Plan,
     asked: &Resilience,

@@ -10,8 +10,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Log file of a task, in the folder that the array is submitted from: Slurm does not accept every
-/// path in a script.
+/// Log file of a task, relative to the folder from which the array is submitted: Slurm does not
+/// accept every path in a script.
 const LOG: &str = "log-%a.txt";
 
 /// The reason why a job could not be submitted.
@@ -34,7 +34,7 @@ pub enum SubmitError {
         said: String,
         /// Number of requested tasks.
         shards: u32,
-        /// Maximum number of tasks that this cluster accepts, if it is known and smaller.
+        /// Maximum number of tasks that this cluster accepts, if known and smaller than `shards`.
         array_max: Option<u32>,
     },
 }
@@ -84,14 +84,14 @@ fn script_in(job: &Job<'_>, folder: &Path) -> String {
 /// Writes the files that the tasks need and submits the array; returns the output of `sbatch`.
 ///
 /// # Errors
-/// [`SubmitError`] if a file cannot be written or Slurm rejects the job; the submission's folder is
-/// removed in that case.
+/// [`SubmitError`] if Slurm cannot use the path, a file cannot be written, `sbatch` cannot be
+/// started, or Slurm rejects the job. In the last two cases, the submission's folder is removed.
 pub fn submit(job: &Job<'_>, suite_text: &str) -> Result<String, SubmitError> {
     check_path(job)?;
     let folder = job.write(suite_text, |folder| script_in(job, folder))?;
     let submitted = submit_from(job, &folder);
     if submitted.is_err() {
-        // The folder is not used; failure to remove it is ignored.
+        // The folder is no longer needed; failure to remove it is ignored.
         let _ = fs::remove_dir_all(&folder);
     }
     submitted
@@ -113,8 +113,8 @@ fn submit_from(job: &Job<'_>, folder: &Path) -> Result<String, SubmitError> {
     })
 }
 
-/// Queries the maximum number of tasks of an array, since `sbatch` does not report it when it
-/// rejects more.
+/// Queries the maximum number of tasks in an array, since `sbatch` does not report it when it
+/// rejects a larger array.
 fn array_max() -> Option<u32> {
     let output = Command::new("scontrol").args(["show", "config"]).output();
     let config = String::from_utf8_lossy(&output.ok()?.stdout).into_owned();

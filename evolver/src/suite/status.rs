@@ -16,8 +16,8 @@ pub struct Hashes {
     sum: Sha256,
     /// Number of completed runs.
     pub done: u64,
-    /// The lines of `hashes.txt`, one per run: run ID and hash. Only on request, since there may be
-    /// millions.
+    /// The lines of `hashes.txt`, one per run: run ID and hash. Stored only on request, since there
+    /// may be millions of runs.
     pub lines: Option<Vec<u8>>,
 }
 
@@ -41,8 +41,8 @@ impl Hashes {
         let Some(finished) = damaged.read(&directory) else {
             return false;
         };
-        // A process that was killed in its last step leaves temporary files; failure to remove them
-        // is ignored.
+        // A process that was killed in its last step has left temporary files; failure to remove
+        // them is ignored.
         let _ = tidy(&directory);
         let line = format!("{} {}\n", run.id, finished.hash);
         self.sum.update(&line);
@@ -60,7 +60,7 @@ impl Hashes {
     }
 }
 
-/// Numbers of runs with the same settings, by their state.
+/// Numbers of runs with the same settings, by state.
 #[derive(Clone, Debug, Default)]
 pub struct Counts {
     /// Label of the settings.
@@ -69,7 +69,7 @@ pub struct Counts {
     pub number: u32,
     /// Number of completed runs.
     pub done: u32,
-    /// Number of runs that are begun but not complete.
+    /// Number of runs that have begun but are not complete.
     pub begun: u32,
     /// Number of damaged runs.
     pub damaged: u32,
@@ -96,8 +96,8 @@ impl Status {
     pub fn read(plan: &Plan, suite: &Path) -> Result<Self, ReadRunError> {
         let mut damaged = DamagedRuns::default();
         let mut hashes = Hashes::default();
-        // Experiments share runs, so remember their states. Pending runs, maybe a million, are not
-        // stored.
+        // Experiments may share runs, so the states of runs are stored. Pending runs, of which
+        // there may be a million, are not stored.
         let mut known: BTreeMap<String, Progress> = BTreeMap::new();
         for run in plan.runs().iter() {
             if hashes.add(&run, suite, &mut damaged) {

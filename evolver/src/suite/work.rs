@@ -45,7 +45,7 @@ impl Shard {
         }
     }
 
-    /// Returns the name of the file for the hashes of the share's runs.
+    /// Returns the name of the file that contains the hashes of the share's runs.
     #[must_use]
     pub fn hashes_file(self) -> String {
         match self.of {
@@ -64,7 +64,7 @@ impl Shard {
 /// Returns the state of a run, determined from its files.
 ///
 /// # Errors
-/// [`ReadRunError::Damaged`] if the run is marked complete but is not.
+/// [`ReadRunError::Damaged`] if the run is marked complete but is not complete.
 pub fn progress(run: &PlannedRun, suite: &Path) -> Result<Progress, ReadRunError> {
     let directory = run.directory(suite);
     Ok(if complete(&directory)?.is_some() {
@@ -81,7 +81,7 @@ pub fn progress(run: &PlannedRun, suite: &Path) -> Result<Progress, ReadRunError
 pub enum Outcome {
     /// The run is complete.
     Completed,
-    /// Another process has locked the run; the holder is given if the lock names it.
+    /// Another process has locked the run; includes the lock's holder, if the lock names it.
     Held(Option<Holder>),
     /// The run was interrupted and can be resumed.
     Interrupted,
@@ -99,7 +99,7 @@ impl Waiting {
     const PAUSE_MIN: Duration = Duration::from_millis(10);
     /// The longest pause.
     const PAUSE_MAX: Duration = Duration::from_secs(1);
-    /// Minimum pause at which waiting is reported.
+    /// Shortest pause that is reported to the user.
     const PAUSE_SAID: Duration = Duration::from_millis(160);
 
     /// Creates the state before the first pause.
@@ -111,7 +111,7 @@ impl Waiting {
         }
     }
 
-    /// Pauses before this run is checked again, and calls `say` once per run if waiting takes long.
+    /// Pauses before this run is checked again; calls `say` once per run if the wait is long.
     pub fn wait_for(&mut self, run: &PlannedRun, say: impl FnOnce()) {
         if self.pause >= Self::PAUSE_SAID && self.said_of != run.id {
             say();
@@ -121,7 +121,7 @@ impl Waiting {
         self.pause = (self.pause * 2).min(Self::PAUSE_MAX);
     }
 
-    /// Resets the pause after a run has ended, since others may end soon.
+    /// Resets the pause after a run has ended, since other runs may end soon.
     pub fn one_ended(&mut self) {
         self.pause = Self::PAUSE_MIN;
     }
@@ -145,8 +145,8 @@ pub fn work_on(
     each_generation: impl FnMut(u32),
 ) -> Result<Outcome, RunDirError> {
     match begin_or_resume(run, suite, stop, each_generation) {
-        // Without working locks, another process executed the same run unnoticed, and removed the
-        // temporary files of both.
+        // If locks do not work, another process may have executed the same run unnoticed and
+        // removed the temporary files of both processes.
         Err(_) if matches!(progress(run, suite), Ok(Progress::Done)) => Ok(Outcome::Completed),
         worked => worked,
     }

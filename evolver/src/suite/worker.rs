@@ -18,24 +18,24 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Receiver of progress events.
 pub trait Watch {
-    /// Receives the start or resumption of a run; `further` is the number of a run beyond the plan,
+    /// Handles the start or resumption of a run; `further` is the number of a run beyond the plan,
     /// counted from 1.
     fn begins(&self, run: &PlannedRun, further: Option<u32>);
 
-    /// Receives the number of completed generations of a run.
+    /// Handles a change in the number of completed generations of a run.
     fn generation(&self, _run: &PlannedRun, _generations: u32) {}
 
-    /// Receives the completion of a run.
+    /// Handles the completion of a run.
     fn completed(&self, _run: &PlannedRun) {}
 
-    /// Receives that the worker waits because another process has locked the run.
+    /// Handles a wait for a run that another process has locked.
     fn waits(&self, run: &PlannedRun, directory: &Path, holder: Option<&Holder>);
 }
 
 /// The runs that are still to be executed, determined from their files.
 #[derive(Clone, Debug)]
 pub struct ToDo {
-    /// For each run, true if it is to be executed.
+    /// For each run, true if the run is to be executed.
     each: Vec<bool>,
     /// Number of runs to be executed.
     pub number: u64,
@@ -58,10 +58,10 @@ pub enum ToDoError {
 }
 
 impl ToDo {
-    /// Determines the runs to be executed from the files; damaged runs are not among them.
+    /// Determines from the files which runs are to be executed; damaged runs are not included.
     ///
     /// # Errors
-    /// [`ToDoError`] if the folder cannot be read or the disk is much too small. The disk is
+    /// [`ToDoError`] if the folder cannot be read or the disk is far too small. Disk space is
     /// checked first, since there may be billions of runs.
     pub fn read(
         runs: Runs<'_>,
@@ -147,8 +147,8 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Executes a run; returns `None` if an error affects only this run, which is then added to the
-    /// damaged runs.
+    /// Executes a run. If an error affects only this run, adds the run to the damaged runs and
+    /// returns `None`.
     fn work_on(
         &mut self,
         run: &PlannedRun,
@@ -247,8 +247,8 @@ impl<'a> Worker<'a> {
             }
             match self.work_on(&run, |_| {})? {
                 Some(Outcome::Completed) => after = number - 1,
-                // Another process also searches, and the result of its run decides whether more
-                // runs are needed.
+                // Another process is also searching, and the result of its run determines whether
+                // more runs are needed.
                 Some(Outcome::Held(_)) if self.stop.load(Ordering::Relaxed) => {
                     return Ok(Ended::Interrupted);
                 }
@@ -256,7 +256,7 @@ impl<'a> Worker<'a> {
                     watch.waits(&run, &directory, holder.as_ref());
                 }),
                 Some(Outcome::Interrupted) => return Ok(Ended::Interrupted),
-                // With a damaged run it is unknown whether more runs are needed.
+                // If a run is damaged, it is unknown whether more runs are needed.
                 None => return Ok(Ended::Whole),
             }
         }

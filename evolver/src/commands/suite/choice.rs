@@ -106,12 +106,12 @@ impl<'a> Chosen<'a> {
     pub(super) fn searches(&self) -> &'a [Resilience] {
         match self.choice.runs {
             None => &self.source.suite.resiliences,
-            // With a different number of runs, the experiment is different.
+            // With a different number of runs, it is a different experiment.
             Some(_) => &[],
         }
     }
 
-    /// Returns the command that executes the runs and searches.
+    /// Returns the command that executes the runs and the searches.
     pub(super) fn command(&self) -> String {
         let mut words = vec![self.source.called.clone(), "run".to_owned()];
         let flags = self.choice.flags();
@@ -142,7 +142,7 @@ fn directory(source: &Source, choice: &Choice) -> PathBuf {
     choice.out.clone().unwrap_or_else(|| {
         let runs = Path::new("runs");
         let taken = if source.built_in { "" } else { BUILT_IN };
-        // Keeps using a directory that an earlier version created with this name.
+        // If an earlier version created a directory with this name, that directory is still used.
         let mut there = fs::read_dir(runs).into_iter().flatten().flatten();
         if suite.name != taken && there.any(|entry| entry.file_name() == *suite.name) {
             return runs.join(&suite.name);

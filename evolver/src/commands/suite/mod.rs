@@ -68,8 +68,8 @@ pub enum Verb {
 /// Runs `evolver paper …`.
 ///
 /// # Errors
-/// [`BadInput`] if an argument or the suite is invalid; nothing has been written then. After other
-/// errors, unfinished runs can be resumed.
+/// [`BadInput`] if an argument or the suite is invalid, or memory or disk space is insufficient; in
+/// these cases, nothing is written. After other errors, unfinished runs can be resumed.
 pub fn paper(verb: &Verb) -> anyhow::Result<Exit> {
     let paper = Source {
         suite: Suite::paper().map_err(BadInput::new)?,

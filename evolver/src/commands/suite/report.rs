@@ -31,8 +31,8 @@ pub struct ReportOptions {
 /// Writes the report.
 ///
 /// # Errors
-/// [`BadInput`] if the directory holds something other than a report or no run is complete;
-/// otherwise if a run cannot be read or a file cannot be written.
+/// [`BadInput`] if the directory contains anything other than a report, no run is complete, or
+/// memory is insufficient. Other errors if a run cannot be read or a file cannot be written.
 pub(super) fn write(chosen: &Chosen, options: &ReportOptions) -> anyhow::Result<Exit> {
     let out = options
         .to
@@ -78,7 +78,7 @@ pub(super) fn write(chosen: &Chosen, options: &ReportOptions) -> anyhow::Result<
     Ok(name_damaged(&damaged, Some(&again)))
 }
 
-/// Returns the memory of the largest evaluation that a report repeats.
+/// Returns the memory needs of the largest evaluation that a report repeats.
 fn needs_of_report(plan: &Plan, suite: &Suite) -> Needs {
     let mut most = Needs::default();
     for experiment in &plan.experiments {

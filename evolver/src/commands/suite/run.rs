@@ -79,8 +79,8 @@ impl Share {
 /// Executes a share of the chosen runs.
 ///
 /// # Errors
-/// [`BadInput`] if an argument is invalid; nothing has been written then. After other errors,
-/// unfinished runs can be resumed.
+/// [`BadInput`] if an argument is invalid, or memory or disk space is insufficient; in these cases,
+/// nothing is written. After other errors, unfinished runs can be resumed.
 pub(super) fn run(chosen: &Chosen, share: Share, options: &RunOptions) -> anyhow::Result<Exit> {
     let shard = share.shard();
     let runs = shard.of_plan(&chosen.plan);
@@ -94,7 +94,7 @@ pub(super) fn run(chosen: &Chosen, share: Share, options: &RunOptions) -> anyhow
     finish(chosen, share, options, runs, damaged)
 }
 
-/// Executes the runs and searches; returns the outcome of the work and the damaged runs.
+/// Executes the runs and the searches; returns the outcome of the work and the damaged runs.
 fn work(
     chosen: &Chosen,
     share: Share,
@@ -150,7 +150,7 @@ fn finish(
 ) -> anyhow::Result<Exit> {
     let (directory, shard) = (&chosen.directory, share.shard());
     // Number and hash come from the same reading, so that they agree. The file of hashes is written
-    // only for the whole suite: the lines of a choice would replace those of the whole.
+    // only for the whole suite: the hashes of some runs must not replace the hashes of all runs.
     let is_whole = chosen.choice.is_whole();
     let mut hashes = Hashes::read(runs, directory, is_whole, &mut damaged);
     let done = hashes.done;
@@ -201,7 +201,7 @@ fn finish(
 
 /// Returns the command that searches for a structure, if a search may be needed.
 fn search_by(chosen: &Chosen) -> Option<String> {
-    // Damaged runs may be in a different share; the command reports them.
+    // Damaged runs may belong to a different share; the command reports them.
     let is_needed = |asked: &Resilience| {
         let (plan, directory) = (&chosen.plan, &chosen.directory);
         let looked = look(plan, asked, directory, 0, &mut DamagedRuns::default());

@@ -13,7 +13,7 @@ use std::path::Path;
 /// Prints the number of complete runs and the state of the searches.
 ///
 /// # Errors
-/// If a directory cannot be read; a damaged run is only reported.
+/// If a directory cannot be read. Damaged runs are reported but are not errors.
 pub(super) fn print(chosen: &Chosen) -> anyhow::Result<Exit> {
     let mut damaged = print_runs(&chosen.plan, &chosen.directory)?;
     print_searches(chosen, &mut damaged);

@@ -11,7 +11,7 @@ use clap::{Args, ValueEnum};
 use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_evolution::settings::count;
 
-/// A program that distributes tasks over machines.
+/// A program that distributes tasks among machines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ClusterEngine {
     /// One job array of Slurm.
@@ -43,8 +43,8 @@ pub struct SubmitOptions {
 /// Submits the runs, or prints the script.
 ///
 /// # Errors
-/// [`BadInput`] if a flag is invalid or the disk is too small; otherwise if the cluster's programs
-/// fail.
+/// [`BadInput`] if a flag is invalid or disk space is insufficient. Other errors if the cluster's
+/// programs fail.
 pub(super) fn submit(chosen: &Chosen, options: &SubmitOptions) -> anyhow::Result<Exit> {
     let job = cluster::Job {
         name: &chosen.source.suite.name,

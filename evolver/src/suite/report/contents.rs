@@ -33,8 +33,8 @@ pub struct ProvenanceRow {
     pub seeds: String,
     /// Programs that executed the runs.
     pub programs: String,
-    /// SHA-256 of the runs' hashes, in order of their seeds; for runs without a hash, of their
-    /// outcomes.
+    /// SHA-256 of the runs' hashes, in order of their seeds; if the runs have no hash, SHA-256 of
+    /// their outcomes.
     pub hash: String,
     /// The command that executes the runs.
     pub command: String,
@@ -74,17 +74,17 @@ pub struct SuiteReport {
     pub has_gallery: bool,
     /// True if experiments share runs.
     pub shares_runs: bool,
-    /// Number of tests in the tables that could find a difference, each counted once.
+    /// Number of different tests in the tables that could find a difference.
     pub tests: usize,
     /// True if the tables include numbers from the paper.
     pub has_paper: bool,
-    /// The command line prefix that selects this suite.
+    /// Beginning of every command line for this suite.
     pub called: String,
     /// The tables.
     pub tables: Vec<Table>,
     /// The figures.
     pub figures: Vec<Figure>,
-    /// Time spent on all runs, each counted once.
+    /// Time spent on all runs; a shared run is counted once.
     pub time: TimeSpent,
     /// Provenance of the runs.
     pub making: Vec<ProvenanceRow>,
@@ -254,7 +254,7 @@ fn seeds(runs: &[GatheredRun]) -> String {
     }
 }
 
-/// Returns the provenance of runs that the report itself executes: from new starts and after
+/// Returns the provenance of the runs that the report itself executes, from new starts and after
 /// damage.
 fn made_again(gathered: &Gathered, called: &str) -> Vec<ProvenanceRow> {
     let program = format!(

@@ -1,4 +1,4 @@
-//! Choice of the areas to damage: small rectangles with given numbers of robots.
+//! Choice of the areas to damage: small rectangles that contain given numbers of robots.
 
 use minimal_surprise_sim::{Grid, Pose};
 
@@ -41,9 +41,10 @@ impl Sums {
     }
 }
 
-/// Returns, for every number in order, the smallest rectangle that contains exactly this number of
-/// robots and neither overlaps nor touches earlier rectangles; `None` if no rectangle qualifies.
-/// Ties go to the southernmost corner, then the westernmost, then the flattest rectangle.
+/// Returns, for each of the numbers in order, the smallest rectangle that contains exactly this
+/// number of robots and neither overlaps nor touches earlier rectangles; `None` if no rectangle
+/// qualifies. Ties go to the southernmost corner, then the westernmost, then the flattest
+/// rectangle.
 #[must_use]
 pub fn smallest_apart(grid: Grid, poses: &[Pose], numbers: &[u32]) -> Vec<Option<Rectangle>> {
     let mut robots = vec![false; grid.cells() as usize];

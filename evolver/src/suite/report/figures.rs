@@ -166,7 +166,7 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
             }
         }
     }
-    // In the paper's order; structures that it lacks stay in the suite's order.
+    // In the paper's order; structures that are not in the paper stay in the suite's order.
     figures.sort_by_key(|figure| figure.number.unwrap_or(u32::MAX));
     let numbers = ["Fig. 13: ", "Fig. 14: "];
     for (index, resilient) in gathered.resiliences.iter().enumerate() {
@@ -180,7 +180,7 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Result<Vec<Figure>, Figu
     Ok(figures)
 }
 
-/// Mark of a run beyond the plan.
+/// Mark that denotes a run beyond the plan.
 const BEYOND_PLAN: &str = "*";
 
 /// The names of a figure.
@@ -220,8 +220,8 @@ impl Name {
     }
 }
 
-/// Returns runs beyond the plan with a group's settings, one for each structure that a damage
-/// experiment needs and no run of the group has.
+/// Returns runs beyond the plan with a group's settings: one for each structure that a damage
+/// experiment needs but no run of the group has.
 fn beyond_plan<'a>(
     gathered: &'a Gathered,
     group: &Group,

@@ -11,8 +11,8 @@ use std::collections::BTreeSet;
 
 /// Maximum difference between a median best fitness and the paper's.
 const FITNESS_TOLERANCE: f64 = 0.03;
-/// Margin for floating-point error, so that printed numbers that differ by exactly the tolerance
-/// are accepted.
+/// Margin for floating-point error: printed numbers that differ by exactly the tolerance are
+/// accepted.
 const PRINTED: f64 = 1e-9;
 
 /// Verdict on a finding of the paper in our runs.
@@ -21,12 +21,12 @@ const PRINTED: f64 = 1e-9;
 pub enum Verdict {
     /// The finding holds.
     Holds,
-    /// The tendency exists, but may be due to chance.
+    /// The runs show the tendency, but it may be due to chance.
     #[serde(rename = "holds, not significant")]
     HoldsNotSignificantly,
     /// The finding does not hold.
     Differs,
-    /// The finished runs are not enough to decide.
+    /// There are too few finished runs to decide.
     #[serde(rename = "not enough runs")]
     NotEnoughRuns,
 }
@@ -44,7 +44,7 @@ impl Verdict {
     }
 }
 
-/// Evidence for a verdict, beyond the finding itself.
+/// Evidence for a verdict, in addition to the finding itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Detail {
     /// No further evidence.
@@ -62,7 +62,7 @@ pub struct Contradiction {
     pub seed: u64,
     /// Run ID.
     pub run: String,
-    /// Structures of the run, and its fitness.
+    /// Structures and fitness of the run.
     pub formed: String,
 }
 
@@ -144,8 +144,8 @@ fn universal(groups: &[&Group], is_true: bool) -> Verdict {
     }
 }
 
-/// Returns the verdict on a statement about a tendency; a false statement differs only if the test
-/// is significant.
+/// Returns the verdict on a statement about a tendency; a false statement counts as different only
+/// if the test is significant.
 fn tendency(groups: &[&Group], is_true: bool, test: Test) -> Verdict {
     let complete = groups.iter().all(|group| group.is_complete());
     if groups.iter().any(|group| group.runs.is_empty()) {
@@ -206,7 +206,7 @@ fn unfinished(group: &Group) -> String {
     }
 }
 
-/// Returns all findings whose experiments are in the plan.
+/// Returns all findings that are about experiments in the plan.
 #[must_use]
 pub fn all(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
     if paper.distributions.is_empty() {
@@ -545,7 +545,8 @@ fn fitness(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
         let ours = median(&values);
         let interval = median_interval(&values);
         let near = (ours - number.value).abs() <= FITNESS_TOLERANCE + PRINTED;
-        // The verdict is certain if the whole interval is within the tolerance, or none of it.
+        // The verdict is certain if the interval is entirely within or entirely outside the
+        // tolerance.
         let sure = values.len() >= RUNS_MIN
             && interval.is_some_and(|interval| {
                 let ends = [interval.low, interval.high];

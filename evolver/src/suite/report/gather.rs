@@ -33,7 +33,7 @@ pub enum GatherError {
     /// A structure cannot be damaged.
     #[error(transparent)]
     Damage(#[from] DamageError),
-    /// A suite names an unknown structure.
+    /// The suite names an unknown structure.
     #[error("structure = {name:?}: expected one of: {}", Structure::ALL.map(Structure::name).join(", "))]
     UnknownStructure {
         /// The name.
@@ -64,8 +64,8 @@ impl GatheredRun {
         self.finished.best_fitness.last().copied().unwrap_or(0.0)
     }
 
-    /// Returns the structure that the run counts for in tests; ties go to the first in the paper's
-    /// order.
+    /// Returns the structure that the run counts towards in tests; ties go to the first in the
+    /// paper's order.
     #[must_use]
     pub fn name(&self) -> Option<Structure> {
         self.names.first().copied()
@@ -130,7 +130,7 @@ impl Group {
         }
     }
 
-    /// Returns one number per run.
+    /// Computes one number per run.
     pub fn values(&self, of: impl Fn(&GatheredRun) -> f64) -> Vec<f64> {
         self.runs.iter().map(of).collect()
     }
@@ -141,7 +141,7 @@ impl Group {
 pub struct NewStart {
     /// Fitness, 0 to 1.
     pub fitness: f64,
-    /// Orientation of the lines; `None` without lines.
+    /// Orientation of the lines; `None` if no lines formed.
     pub orientation: Option<LineOrientation>,
     /// The dominant structures.
     pub names: Vec<Structure>,
@@ -247,7 +247,7 @@ impl Damaged {
     }
 }
 
-/// The result of the same damage to all runs of the structure.
+/// The result of applying the same damage to all runs of the structure.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overall {
     /// Number of runs after damage.
@@ -259,7 +259,8 @@ pub struct Overall {
     /// Number of areas for which, after removal, the share at the end was at least the share at the
     /// start.
     pub removal_holds: usize,
-    /// Number of such areas after repositioning, by the mean shares.
+    /// Number of areas for which, after repositioning, the mean share at the end was at least the
+    /// mean share at the start.
     pub repositioning_holds: usize,
     /// Mean gain in share from start to end after removal, as a fraction.
     pub removal_gain: f64,
@@ -306,7 +307,7 @@ impl Gathered {
     /// experiments.
     ///
     /// # Errors
-    /// [`GatherError`] if a finished run cannot be executed again.
+    /// [`GatherError`] if a finished run cannot be read or executed again.
     pub fn read(plan: &Plan, suite: &Suite, directory: &Path) -> Result<Self, GatherError> {
         let (mut groups, mut damaged) = (Vec::new(), DamagedRuns::default());
         for experiment in &plan.experiments {
@@ -334,7 +335,7 @@ impl Gathered {
         }
         let mut further = Vec::new();
         for experiment in &plan.experiments {
-            // Two searches through the same experiment share its runs.
+            // Two searches through the same experiment share the experiment's runs.
             let searched = resiliences.iter().filter(|r| r.asked.of == experiment.name);
             let number = searched.map(|r| r.further).max().unwrap_or(0);
             further.extend(read_further(
@@ -353,7 +354,8 @@ impl Gathered {
         })
     }
 
-    /// Returns the runs of an experiment with these settings, if they are in the plan.
+    /// Returns the group of an experiment's runs with these settings; `None` if the plan has no
+    /// such runs.
     #[must_use]
     pub fn group(&self, experiment: &str, label: &str) -> Option<&Group> {
         self.groups
@@ -405,7 +407,7 @@ fn read_group(
     })
 }
 
-/// Reads the first `number` runs beyond the plan of an experiment; groups them by settings.
+/// Reads an experiment's first `number` runs beyond the plan, and groups them by settings.
 fn read_further(
     experiment: &PlannedExperiment,
     number: usize,
@@ -684,7 +686,8 @@ impl Resilient {
         }
     }
 
-    /// Describes the result for all planned runs of the structure; `None` without areas to damage.
+    /// Describes the result for all planned runs of the structure; `None` if there were no areas to
+    /// damage.
     pub(super) fn all_damaged(&self) -> Option<String> {
         let all = &self.overall;
         let damaged = match self.named {

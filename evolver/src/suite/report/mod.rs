@@ -1,5 +1,5 @@
-//! The report of a suite: its tables, figures and findings compared with the paper's, with
-//! intervals and tests.
+//! The report of a suite: tables, figures and findings, compared with the paper's, with intervals
+//! and tests.
 //!
 //! [`gather`] reads the finished runs and executes re-evaluations and damage experiments;
 //! [`tables`], [`figures`] and [`findings`] evaluate the runs and compare them with the numbers in
@@ -67,8 +67,9 @@ pub const GALLERY: &str = "gallery";
 /// File that marks a directory as a report, which a new report may replace.
 const MARKER: &str = ".evolver-report";
 
-/// Returns whether a report would replace only a report: the directory must be new, marked as a
-/// report, or empty except for notes and a gallery. A gallery in the directory must also be marked.
+/// Returns whether a new report would overwrite only an earlier report: the directory must be new,
+/// marked as a report, or empty except for notes and a gallery. A gallery in the directory must
+/// also be marked.
 ///
 /// # Errors
 /// [`FileError`] if the directory cannot be read.

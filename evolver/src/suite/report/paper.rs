@@ -6,7 +6,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// All numbers of the paper that the report compares with.
+/// All numbers from the paper that the report compares with.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PaperValues {
@@ -22,7 +22,7 @@ pub struct PaperValues {
     /// Results of damage to structures.
     #[serde(rename = "damage")]
     pub damages: Vec<DamageValues>,
-    /// Increases in the share of line runs by partly predefining a line.
+    /// Increases in the share of line runs due to partly predefining a line.
     pub raised: Vec<Raised>,
 }
 
@@ -37,7 +37,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// Returns a name for a file of the numbers from this source.
+    /// Returns a file name for the numbers from this source.
     #[must_use]
     pub fn file_name(&self) -> String {
         match self {
@@ -46,7 +46,7 @@ impl Source {
         }
     }
 
-    /// Formats the source of a table; empty if the paper has no such numbers.
+    /// Formats the source of a table; returns an empty text if the paper has no such numbers.
     #[must_use]
     pub fn in_words(source: Option<&Self>) -> String {
         source.map(Self::to_string).unwrap_or_default()
@@ -119,8 +119,8 @@ impl Distribution {
         self.percent.get(category).copied().unwrap_or(0.0)
     }
 
-    /// Converts the shares to whole runs per category; a tied run, printed as fractions, counts for
-    /// the first of its categories.
+    /// Converts the shares to numbers of whole runs per category; a tied run, printed as fractions,
+    /// counts towards the first of its categories.
     #[must_use]
     pub fn runs(&self, categories: &[String]) -> Vec<u32> {
         let exact = |category: &String| self.percent(category) / 100.0 * f64::from(self.runs);

@@ -15,14 +15,14 @@ const SEED: u64 = 2021;
 const RESAMPLES: usize = 10_000;
 /// Maximum number of tables that an exact test enumerates; above it, tables are sampled at random.
 const EXACT_TABLES_MAX: u64 = 3_000_000;
-/// Number of tables drawn if an exact test would have too many.
+/// Number of tables drawn if an exact test would have to enumerate too many.
 const DRAWN_TABLES: u32 = 100_000;
 /// Normal quantile for a two-sided 95 % interval.
 const Z_95: f64 = 1.959_963_984_540_054;
 /// Significance level: a difference with a smaller p-value is significant.
 pub const SIGNIFICANT: f64 = 0.05;
-/// Minimum number of runs for a test of a median: five runs are all on one side of it by chance in
-/// one of sixteen cases, so p < 0.05 is impossible.
+/// Minimum number of runs for a test of a median: with five runs, all are on the same side of the
+/// median by chance in one of sixteen cases, so p < 0.05 is impossible.
 pub const RUNS_MIN: usize = 6;
 /// Name of the sign test.
 pub const SIGN_TEST: &str = "sign test";
@@ -74,7 +74,7 @@ pub fn wilson(successes: f64, of: f64) -> Option<Interval> {
 }
 
 /// Computes the 95 % interval of a median: the 2.5 % and 97.5 % quantiles of the medians of
-/// resamples. Returns `None` without values.
+/// resamples. Returns `None` if there are no values.
 #[must_use]
 pub fn median_interval(values: &[f64]) -> Option<Interval> {
     if values.is_empty() {
@@ -111,7 +111,7 @@ pub fn quantile(ascending: &[f64], share: f64) -> f64 {
 
 /// Tests whether two rows of counts may come from the same distribution: Fisher's exact test in
 /// Freeman and Halton's form for 2 × c tables. Enumerates all tables with the same margins, or
-/// draws such tables if there are too many. p is 1 if a row or all but one column are empty.
+/// draws such tables if there are too many. p is 1 if a row is empty or at most one column is not.
 #[must_use]
 pub fn fisher(first: &[u32], second: &[u32]) -> Test {
     assert_eq!(first.len(), second.len(), "both rows have the same columns");
@@ -165,8 +165,8 @@ fn exact(totals: &[u32], row: u32, observed: f64) -> f64 {
     p.min(1.0)
 }
 
-/// Calls `visit` for every first row with this sum, with the logarithm of its number of
-/// arrangements.
+/// Calls `visit` for every possible first row with this sum, with the logarithm of the row's number
+/// of arrangements.
 fn every_table(totals: &[u32], row: u32, ways: f64, visit: &mut impl FnMut(f64)) {
     match totals {
         [] if row == 0 => visit(ways),
@@ -217,8 +217,8 @@ pub fn sign(successes: u32, failures: u32) -> Test {
     Test { name: SIGN_TEST, p }
 }
 
-/// Tests whether a median may be this value, known to within `rounding`: sign test, two-sided.
-/// Values within the rounding count neither for a larger nor for a smaller median.
+/// Tests whether a median may be this value, which is known to within `rounding`: sign test,
+/// two-sided. Values within the rounding count neither as larger nor as smaller.
 #[must_use]
 pub fn median_is(values: &[f64], median: f64, rounding: f64) -> Test {
     let above = values.iter().filter(|&&v| v > median + rounding).count();
@@ -231,7 +231,7 @@ pub fn median_is(values: &[f64], median: f64, rounding: f64) -> Test {
     Test { name: SIGN_TEST, p }
 }
 
-/// Tests whether one sample tends to larger values than the other: Mann and Whitney's test,
+/// Tests whether one sample tends to have larger values than the other: Mann and Whitney's test,
 /// two-sided, normal approximation with correction for ties and continuity.
 #[must_use]
 pub fn mann_whitney(first: &[f64], second: &[f64]) -> Test {
@@ -329,8 +329,8 @@ mod tests {
     fn a_median_is_told_by_the_values_beyond_its_rounding() {
         assert_close(median_is(&[0.1, 0.2, 0.31, 0.9], 0.3, 0.02).p, 1.0, 1e-9);
         assert_close(median_is(&[0.4; 9], 0.3, 0.02).p, 2.0 / 512.0, 1e-9);
-        // Seven of twenty values are above, none below, the others as printed: the median is as
-        // printed.
+        // Seven of twenty values are above the printed median, none are below, and the others equal
+        // it: the median is as printed.
         let mut values = [0.0; 20];
         values[..7].fill(0.5);
         assert_eq!(median_is(&values, 0.0, 0.005).p, 1.0);

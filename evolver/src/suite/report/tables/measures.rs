@@ -1,4 +1,4 @@
-//! Tables of measures: fitness, movement and other numbers of the paper's text.
+//! Tables of measures: fitness, movement and other numbers from the paper's text.
 
 use super::table::{Row, Table, Value};
 use crate::suite::report::gather::{GatheredRun, Group};
@@ -12,7 +12,7 @@ use minimal_surprise_sim::structures::Structure;
 /// Name of the measure that the paper gives for most settings.
 pub const MEDIAN_BEST_FITNESS: &str = "median best fitness";
 
-/// Creates Tables 4 and 5 below their first row: measures of the runs of each structure.
+/// Creates the rows of Tables 4 and 5 below the first row: measures of the runs of each structure.
 pub(super) fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table> {
     let of_paper = |structure: Structure| {
         paper.structures.iter().find(|values| {
@@ -159,7 +159,7 @@ pub(super) fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) 
     })
 }
 
-/// The columns of [`numbers`]: name and one value per group.
+/// The columns of [`numbers`], each with a name and one value per group.
 struct Columns<'a> {
     experiment: &'a str,
     groups: &'a [&'a Group],
@@ -167,7 +167,8 @@ struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    /// Returns whether the table has a column: if the paper has a number for it.
+    /// Returns whether the table has a column for this measure: only if the paper has a number for
+    /// it.
     fn has(&self, measure: &str) -> bool {
         measure == MEDIAN_BEST_FITNESS
             || self
@@ -294,7 +295,7 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// Runs that a share refers to.
+/// Runs over which a share is computed.
 #[derive(Clone, Copy)]
 enum Among {
     LineRuns,
@@ -309,7 +310,7 @@ impl Among {
         }
     }
 
-    /// Returns the number of these runs in the paper.
+    /// Returns the number of such runs in the paper.
     fn of_paper(self, shares: &Distribution) -> u32 {
         match self {
             Self::LineRuns => {

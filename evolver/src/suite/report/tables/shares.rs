@@ -27,7 +27,8 @@ struct Shared<'a> {
 }
 
 impl Shared<'_> {
-    /// Returns whether the row has a category; groupings are either separate or combined.
+    /// Returns whether the row has a category; a row has either separate groupings or a combined
+    /// one.
     fn has(&self, category: &str) -> bool {
         let together = self.paper.is_some_and(|d| d.percent.contains_key(GROUPING));
         if category == GROUPING {
@@ -40,8 +41,8 @@ impl Shared<'_> {
     }
 }
 
-/// Creates the tables of dominant structures: one for each of the paper's, and one for settings
-/// that are not in the paper.
+/// Creates the tables of dominant structures: one for each table of the paper, and one for the
+/// settings that are not in the paper.
 pub(super) fn structure_tables(
     experiment: &str,
     groups: &[&Group],
@@ -77,7 +78,7 @@ pub(super) fn structure_tables(
         let id = match source {
             None => format!("structures-{experiment}"),
             Some(table @ Source::Table(_)) => table.file_name(),
-            // A section may describe several experiments.
+            // One section of the paper may describe several experiments.
             Some(section) => format!("{}-{experiment}", section.file_name()),
         };
         let title = format!("{experiment}: runs by dominant structure, %");
@@ -95,7 +96,7 @@ pub(super) fn structure_tables(
     tables.collect()
 }
 
-/// Returns the categories of every run; combines the groupings if the paper does.
+/// Returns the categories of every run; combines the groupings if the paper combines them.
 fn structure_categories(group: &Group, paper: Option<&Distribution>) -> Vec<Vec<String>> {
     let together = paper.is_some_and(|d| d.percent.contains_key(GROUPING));
     let name = |structure: &Structure| {
@@ -217,7 +218,8 @@ fn share_table(
     }
 }
 
-/// Describes the share of runs that form any of the groupings, if the paper separates them.
+/// Describes the share of runs that form any of the groupings, if the paper reports the groupings
+/// separately.
 fn groupings_together(shared: &Shared<'_>) -> Option<String> {
     let paper = shared.paper.filter(|_| shared.of == Of::Structures)?;
     let groupings = Structure::ALL.into_iter().filter(|s| is_grouping(*s));
@@ -281,7 +283,7 @@ fn distribution_test(shared: &Shared<'_>, categories: &[String]) -> Option<Value
     Some(value.tested(fisher(&ours, &paper.runs(categories))))
 }
 
-/// Creates Table 6: line orientations, in the runs and from new starts.
+/// Creates Table 6: line orientations in the runs and from new starts.
 pub(super) fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<Table> {
     let is_line = |group: &&Group| {
         group.settings.topology().prediction() == Prediction::Predefined(Template::Line)

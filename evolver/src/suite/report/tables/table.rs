@@ -26,7 +26,7 @@ pub struct Value {
     pub paper: Option<f64>,
     /// The paper's median, if the number is a mean.
     pub paper_median: Option<f64>,
-    /// Name of the test for a difference between both numbers.
+    /// Name of the test for a difference between the two numbers.
     pub test: Option<&'static str>,
     /// The test's p-value.
     pub p: Option<f64>,
@@ -52,7 +52,7 @@ impl Value {
         self.p.is_some() && !too_few
     }
 
-    /// Returns whether a value from a different table is the same.
+    /// Returns whether a value in a different table is the same value.
     pub fn repeats(&self, other: &Self) -> bool {
         (&self.setting, &self.what) == (&other.setting, &other.what)
             && (self.of, self.ours, self.paper, self.p)
@@ -92,7 +92,7 @@ impl Value {
         })
     }
 
-    /// Formats the paper's number in the same way, with the digits printed there.
+    /// Formats the paper's number in the same way, with the digits printed in the paper.
     pub fn theirs_in_words(&self) -> Option<String> {
         let paper = self.paper?;
         Some(match self.paper_median {
