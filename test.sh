@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs all tests: ./test.sh, or ./test.sh --all to include the long ones.
+# Runs all tests: ./test.sh, or ./test.sh --all to include the long tests.
 #
 # Installs missing tools (a C linker, the thumbv7em targets, QEMU, Chromium, GNU parallel, rustfmt
 # and clippy; for --all also Slurm) and prints what it installs. Needs Rust and, if a tool is
@@ -156,7 +156,7 @@ if [ -n "${TEST_ALL:-}" ]; then
         cargo deny --manifest-path $manifest --config deny.toml check licenses bans sources
     done
     if cargo deny fetch db; then
-        # scripts/fuzz.sh locks fuzz/ to the root's dependencies and libFuzzer.
+        # scripts/fuzz.sh locks fuzz/ to the dependencies of the root workspace and to libFuzzer.
         for manifest in Cargo.toml firmware-example/Cargo.toml fuzz/Cargo.toml; do
             cargo deny --manifest-path $manifest --config deny.toml check advisories
         done

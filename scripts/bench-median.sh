@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Prints the median and range of five runs of `evolver bench`, and the processor's name.
+# Prints the medians and ranges of five runs of `evolver bench`, and the processor's name.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo build --release --quiet

@@ -3,7 +3,7 @@
 #
 #     scripts/draw-lines.sh [SEED [NUMBER]]      default: seed 1, 300 lines
 #
-# For the same revision, the same seed draws the same lines.
+# The same seed draws the same lines if the revision is the same.
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -2,9 +2,9 @@
 # Coverage-guided fuzzing of the targets in tests/fuzz: scripts/fuzz.sh [SECONDS [TARGET...]]
 #
 # Starts from tests/fuzz-corpus and runs each target for SECONDS (default 300), one target per core
-# at a time. An input on which a reader fails is saved there as found-...; commit it with the fix.
-# Needs a C++ compiler because libFuzzer is written in C++, but no nightly Rust. The address
-# sanitizer is not used, because no reader has unsafe code.
+# at a time. An input on which a reader fails is saved in the corpus as found-...; commit it with
+# the fix. Needs a C++ compiler because libFuzzer is written in C++, but no nightly Rust. The
+# address sanitizer is not used, because no reader has unsafe code.
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -22,7 +22,8 @@ while [ "$shard" -lt "$shards" ]; do
         cargo mutants --package minimal-surprise-controller --package minimal-surprise-slots \
             --package minimal-surprise-link --shard "$shard/$shards" --sharding round-robin \
             --output "$this" || status=$?
-        # Exit codes: 2 if mutants survived, 3 if tests timed out, which counts as caught.
+        # Exit codes: 2 if mutants survived, 3 if tests timed out; a mutant whose tests time out
+        # counts as caught.
         case $status in
             0 | 2 | 3) touch "$this/complete" ;;
             *) exit "$status" ;;

@@ -5,6 +5,7 @@ set -eu
 
 elf=$(realpath "$1")
 cd "$(dirname "$0")/.."
-# A calling cargo may have set these for the target; they must not affect builds for the host.
+# A calling cargo may have set these variables for the target; they must not affect builds for the
+# host.
 unset CARGO_BUILD_TARGET RUSTC RUSTC_BOOTSTRAP
 exec cargo run --quiet --package tests --bin run-firmware -- "$elf"

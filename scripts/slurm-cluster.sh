@@ -12,7 +12,7 @@
 set -eu
 
 [ $# = 5 ] || { echo "usage: $0 DIR PORT PORT PORT PORT" >&2 && exit 2; }
-# Slurm resolves the host name at every step, and waits long if this fails.
+# Slurm resolves the host name at every step, and waits a long time if this fails.
 if ! getent hosts "$(hostname -s)" >/dev/null; then
     echo "$0: unknown host $(hostname -s): expected a line for 127.0.0.1 in /etc/hosts" >&2
     exit 1
@@ -82,7 +82,7 @@ until_true() {
 all_idle() { [ "$(SLURM_CONF=$conf sinfo --noheader --Node --format=%T 2>/dev/null | grep -cx idle)" = 3 ]; }
 
 mkdir "$dir"/{log,state,munge}
-# munged requires that everyone can access its socket, and nobody else its key.
+# munged requires that everyone can access its socket, and that nobody else can access its key.
 chmod 755 "$dir"
 chmod 700 "$dir/munge"
 (umask 077 && head -c 1024 /dev/urandom >"$dir/munge/key")
@@ -113,7 +113,7 @@ SelectType=select/cons_tres
 SelectTypeParameters=CR_Core
 # One core per node, regardless of this machine's cores.
 SlurmdParameters=config_overrides
-# A failed node is detected quickly, and used again as soon as it has restarted.
+# A failed node is detected quickly, and is used again as soon as it has restarted.
 SlurmdTimeout=10
 ReturnToService=2
 SchedulerParameters=sched_interval=1,sched_min_interval=0,batch_sched_delay=0,bf_interval=1

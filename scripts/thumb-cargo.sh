@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs cargo for a Cortex-M4 or, with --target, another processor, e.g. in firmware-example:
+# Runs cargo for a Cortex-M4 or, with --target, for a different processor, e.g. in firmware-example:
 #
 #     ../scripts/thumb-cargo.sh build --release [--target thumbv7em-none-eabi]
 #     scripts/thumb-cargo.sh --compiler [--target …]       prints the compiler and builds nothing
@@ -46,7 +46,7 @@ add_target() {
     timeout 120 rustup target add "$target" >&2 && has_target
 }
 
-# Checks whether the system's Rust exists, is new enough, and can build core for another target.
+# Checks whether the system's Rust exists, is new enough, and can build core for a different target.
 has_system_rust() {
     [ -x /usr/bin/cargo ] && [ -x /usr/bin/rustc ] && command -v ld.lld >/dev/null || return 1
     [ -f "$(system rustc --print sysroot)/lib/rustlib/src/rust/library/core/Cargo.toml" ] || return 1

@@ -1,4 +1,4 @@
-//! The emulator: functions that end a program, and the board's wheels.
+//! The emulator: functions that exit a program, and the board's wheels.
 //!
 //! Linking this module also links the logger and the critical section that the logger needs.
 //!
@@ -27,7 +27,7 @@ fn end(status: ExitStatus) -> ! {
     }
 }
 
-/// Register of the board's lights, which stand for the left wheel (bit 0) and the right wheel (bit
+/// Register of the board's lights, which represent the left wheel (bit 0) and the right wheel (bit
 /// 1).
 pub(crate) const WHEELS: u32 = 0x4002_8000;
 

@@ -1,13 +1,14 @@
 //! Fault handling: in every fault, the wheels stop first.
 //!
-//! A fault may occur while the program holds a lock, or because the stack is full. So the handlers
-//! of [`fault_handlers`](crate::fault_handlers) take no lock, and use neither stack nor variables
-//! until they have written the board's [`WheelsOff`], a few registers. Then they reset the stack
-//! pointer to the top of the stack, whose contents are no longer needed, and report the fault.
+//! A fault may occur while the program holds a lock, or because the stack is full. Therefore, the
+//! handlers of [`fault_handlers`](crate::fault_handlers) take no lock, and use neither stack nor
+//! variables until they have written the few registers of the board's [`WheelsOff`]. Then they
+//! reset the stack pointer to the top of the stack, whose contents are no longer needed, and report
+//! the fault.
 //!
 //! **Stack guard.** `memory.x` places the stack below all variables, at the start of RAM, and
-//! [`guard_stack`] forbids access below RAM. So a stack overflow causes a fault immediately, and no
-//! variable is overwritten.
+//! [`guard_stack`] forbids access below RAM. Therefore, a stack overflow causes a fault
+//! immediately, and no variable is overwritten.
 //!
 //! Uses `unsafe` to access registers by address and for handlers written in assembly.
 #![allow(unsafe_code)]
@@ -29,22 +30,22 @@ const PC_AT: u32 = 24;
 /// Registers of the memory protection unit.
 mod mpu {
     pub(super) const CONTROL: *mut u32 = 0xe000_ed94 as *mut u32;
-    /// Protection on, off during faults; addresses outside all regions have their default access.
+    /// Protection on, except during faults; default access to addresses outside all regions.
     pub(super) const CONTROL_ON: u32 = 0b101;
     pub(super) const REGION: *mut u32 = 0xe000_ed98 as *mut u32;
     pub(super) const START: *mut u32 = 0xe000_ed9c as *mut u32;
     pub(super) const ATTRIBUTES: *mut u32 = 0xe000_eda0 as *mut u32;
-    /// A region of 2¹⁵ bytes, on, with no access and no execution.
+    /// An enabled region of 2¹⁵ bytes, without access and execution.
     pub(super) const FORBIDDEN_32_KIB: u32 = 1 << 28 | 14 << 1 | 1;
 }
 
-/// Start of the 32 KiB below RAM, which are larger than any function's frame.
+/// Start of the 32 KiB below RAM; every function's frame is smaller than that.
 const BELOW_RAM: u32 = 0x1fff_8000;
 
 /// Forbids access to the addresses below RAM, which begins at 0x20000000. Without this, the effect
 /// of writes to unmapped addresses depends on the chip; QEMU's `mps2-an386` ignores them.
 pub fn guard_stack() {
-    // SAFETY: registers of the processor. No variable is in the region.
+    // SAFETY: accesses registers of the processor. No variable is in the region.
     unsafe {
         ptr::write_volatile(mpu::REGION, 0);
         ptr::write_volatile(mpu::START, BELOW_RAM);
@@ -54,7 +55,7 @@ pub fn guard_stack() {
     }
 }
 
-/// List of register writes that stop the wheels, whatever the program was doing.
+/// List of register writes that stop the wheels in any state of the program.
 #[derive(Debug)]
 #[repr(C)]
 pub struct WheelsOff<const N: usize> {
@@ -65,7 +66,7 @@ pub struct WheelsOff<const N: usize> {
 }
 
 impl<const N: usize> WheelsOff<N> {
-    /// Creates the list from pairs of a register address and the value to write, in order.
+    /// Creates the list from pairs of a register address and the value to write to it, in order.
     ///
     /// # Safety
     /// The addresses are registers of the chip, not 0, and the values may be written at any time.
@@ -92,7 +93,7 @@ pub enum Fault {
     HardFault(u32),
     /// The non-maskable interrupt at this address.
     NonMaskable(u32),
-    /// An exception or interrupt with this number that has no handler, at this address.
+    /// An exception or interrupt that has this number and no handler, at this address.
     Unexpected(u32, u32),
 }
 
@@ -108,7 +109,7 @@ impl Fault {
         if !stack.contains(&stack_pointer) {
             return Self::StackOverflow;
         }
-        // SAFETY: reads registers that the exception has saved on the stack, and one of the
+        // SAFETY: reads registers that the exception has saved on the stack, and a register of the
         // processor.
         let (pc, exception) = unsafe {
             let pc = ptr::read_volatile((stack_pointer + PC_AT) as *const u32);
@@ -136,7 +137,7 @@ impl fmt::Display for Fault {
 }
 
 /// Defines the handlers of hard faults, to which other faults escalate, and of all exceptions and
-/// interrupts without their own handler. They write a static [`WheelsOff`] and then call a
+/// interrupts without a separate handler. The handlers write a static [`WheelsOff`] and then call a
 /// `fn(Fault) -> !`.
 #[macro_export]
 macro_rules! fault_handlers {

@@ -16,17 +16,17 @@ pub const RELOAD: u32 = 0x00ff_ffff;
 /// Number of `nop`s for the calibration.
 const NOPS: u32 = 1000;
 
-/// Counter of the instructions of a function.
+/// Counter of the instructions that a function executes.
 pub struct Counter {
-    /// Number of ticks for reading the clock twice.
+    /// Number of ticks that pass while the clock is read twice.
     empty_ticks: u32,
-    /// Number of ticks of [`NOPS`] instructions.
+    /// Number of ticks that [`NOPS`] instructions take.
     nops_ticks: u32,
 }
 
 impl Counter {
-    /// Starts SysTick and calibrates it. `None` if SysTick does not count instructions, for example
-    /// without `-icount`.
+    /// Starts and calibrates SysTick; returns `None` if SysTick does not count instructions, for
+    /// example without `-icount`.
     #[must_use]
     pub fn new(mut systick: SYST) -> Option<Self> {
         systick.set_clock_source(SystClkSource::Core);
@@ -49,8 +49,8 @@ impl Counter {
             .then_some(counter)
     }
 
-    /// Returns the number of instructions of `work`, and its result. The maximum is about 650,000
-    /// instructions: above it, SysTick wraps around.
+    /// Returns the number of instructions that `work` executes, and the result of `work`. The
+    /// maximum is about 650,000 instructions; if more are executed, SysTick wraps around.
     pub fn count<T>(&self, work: impl FnOnce() -> T) -> (u32, T) {
         let mut result = None;
         let ticks = ticks(|| result = Some(work()));
@@ -86,7 +86,7 @@ macro_rules! ten {
 }
 use ten;
 
-/// Returns the number of ticks from before `work` until after it.
+/// Returns the number of ticks from just before `work` to just after it.
 #[inline(always)]
 fn ticks(work: impl FnOnce()) -> u32 {
     let start = SYST::get_current();

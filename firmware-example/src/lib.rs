@@ -2,9 +2,9 @@
 //!
 //! [`robot`] is the firmware of a robot, for any [`robot::Board`]. It is portable, as are
 //! [`parity`], [`range_bearing`] and [`stm32f4`]: the host runs the same code to compute the
-//! expected results of the robot. [`mps2`] is QEMU's board; it and the code shared by its programs
-//! are built only for Arm, with the feature `qemu`. The STM32F405's board is a separate package,
-//! `stm32f4/`. Every board uses `faults` to stop its wheels when it cannot continue.
+//! expected results of the robot. [`mps2`] is QEMU's board; the board and the code shared by its
+//! programs are built only for Arm, with the feature `qemu`. The STM32F405's board is a separate
+//! package, `stm32f4/`. Every board uses `faults` to stop its wheels when it cannot continue.
 #![no_std]
 
 pub mod memory_flash;

@@ -1,7 +1,7 @@
 //! The board of QEMU's machine `mps2-an386`: serial line, clock, and flash in a file on the host.
 //!
-//! The wheels are two lights, and the sensors detect one simulated neighbour; the host drives the
-//! robot with step requests.
+//! Two lights represent the wheels, and the sensors detect one simulated neighbour. The host
+//! controls the robot with step requests.
 //!
 //! Uses `unsafe` to access device registers and to pass semihosting arguments by address.
 #![allow(unsafe_code)]
@@ -29,9 +29,9 @@ pub const CONTROL_HZ: u32 = 10;
 
 /// Registers of the serial line, the first UART of Arm's CMSDK.
 mod uart {
-    /// The byte received, or the byte to send.
+    /// The received byte (when read) or the byte to send (when written).
     pub(super) const DATA: *mut u32 = 0x4000_4000 as *mut u32;
-    /// Status bits: a byte was received; the buffer for the byte to send is full.
+    /// Status bits: a byte was received; the transmit buffer is full.
     pub(super) const STATE: *mut u32 = 0x4000_4004 as *mut u32;
     pub(super) const STATE_SENDING: u32 = 1;
     pub(super) const STATE_RECEIVED: u32 = 1 << 1;
@@ -60,7 +60,7 @@ unsafe impl InterruptNumber for Received {
 
 /// QEMU's board: serial line and clock.
 ///
-/// No interrupt is ever taken: interrupts only wake the processor, and the loop polls.
+/// No interrupt handler ever runs: interrupts only wake the processor, and the loop polls.
 pub struct Mps2 {
     systick: SYST,
     periods: u32,
@@ -126,7 +126,7 @@ impl Board for Mps2 {
         if uart_state() & uart::STATE_RECEIVED == 0 {
             return None;
         }
-        // SAFETY: device registers; reading the data register consumes the byte.
+        // SAFETY: reads device registers; reading the data register consumes the byte.
         let data = unsafe {
             ptr::write_volatile(uart::INTERRUPT, uart::INTERRUPT_RECEIVED);
             ptr::read_volatile(uart::DATA)
@@ -139,7 +139,7 @@ impl Board for Mps2 {
         if uart_state() & uart::STATE_SENDING != 0 {
             return false;
         }
-        // SAFETY: a device register; writing it sends the byte.
+        // SAFETY: writes a device register, which sends the byte.
         unsafe { ptr::write_volatile(uart::DATA, byte.into()) };
         true
     }
@@ -170,17 +170,17 @@ impl Board for Mps2 {
     }
 }
 
-/// Flash in the file `flash.bin`, in the directory where QEMU was started. Written data survives if
-/// QEMU is killed.
+/// Flash in the file `flash.bin`, in the directory where QEMU was started. Data that has been
+/// written is kept if QEMU is killed.
 ///
-/// The flash is as strict as a real one: 4-byte words, 4-KiB pages, and no word may be written
-/// twice.
+/// The flash is as strict as real flash: it has 4-byte words and 4-KiB pages, and no word may be
+/// written twice between erases.
 #[derive(Debug)]
 pub struct FileFlash {
     handle: usize,
 }
 
-/// Reason why the file cannot be used as flash.
+/// The reason why an access to the flash failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub enum FileError {
     /// The access is out of bounds or not aligned.
@@ -210,10 +210,10 @@ impl From<NorFlashErrorKind> for FileError {
 const ERASE_STEP: usize = 512;
 
 impl FileFlash {
-    /// Size of the flash in bytes: that of two slots.
+    /// Size of the flash, in bytes: two slots.
     pub const CAPACITY: usize = 2 * Self::ERASE_SIZE;
 
-    /// Opens the file, or creates one in the factory state.
+    /// Opens the file; creates it in the factory state if it does not exist.
     ///
     /// # Errors
     /// [`FileError::Host`] if the host cannot open or write the file.
@@ -268,8 +268,8 @@ impl FileFlash {
 
 fn host_open(mode: usize) -> Option<usize> {
     let name = c"flash.bin".to_bytes_with_nul();
-    // SAFETY: the host reads the name, which ends with a zero byte, and the length without that
-    // byte.
+    // SAFETY: the host reads the name, which ends with a zero byte, and its length, which excludes
+    // that byte.
     let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.len() - 1) };
     (handle != usize::MAX).then_some(handle)
 }

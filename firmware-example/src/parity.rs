@@ -1,4 +1,4 @@
-//! Hashes of everything that the controller computes, which must be equal on every machine.
+//! Hashes of everything that the controller computes. They must be equal on every machine.
 //!
 //! The hashes cover all 65,536 activations and, for every topology, the decisions and hidden values
 //! of many control steps. Genomes and sensor bits come from ChaCha8 with the seed [`SEED`] and the
@@ -15,8 +15,8 @@ use sha2::{Digest as _, Sha256};
 /// Seed of the generator that draws genomes and sensor bits.
 pub const SEED: u64 = 0x5357_4152_4d20_4d34;
 
-/// Number of times that every weight of a genome mutates, one entry per genome. The last genomes
-/// have weights across the whole range of `i16`, many of them saturated.
+/// Number of times that every weight of a genome mutates, one entry per genome. The weights of the
+/// last genomes cover the whole range of `i16`, and many of them are saturated.
 pub const MUTATIONS: [u32; 10] = [0, 0, 1, 2, 5, 10, 50, 100, 500, 1000];
 
 /// Number of control steps of each genome.
@@ -30,7 +30,7 @@ pub const STEPS: u32 = Topology::ALL.len() as u32 * STEPS_PER_TOPOLOGY;
 
 const _: () = assert!(STEPS >= 100_000);
 
-/// A SHA-256; displayed in hexadecimal.
+/// A SHA-256 hash, displayed in hexadecimal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Digest(pub [u8; 32]);
 
@@ -43,14 +43,14 @@ impl fmt::Display for Digest {
     }
 }
 
-/// One result; displayed as the line that a program prints.
+/// One result, displayed as the line that a program prints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {
     /// Hash of all activations. Begins with the kernel ID.
     Activations(Digest),
     /// Hash of the control steps of one topology.
     Topology(Topology, Digest),
-    /// Hash of all preceding digests, and so of all results.
+    /// Hash of all preceding digests, and therefore of all results.
     Total(Digest),
 }
 
@@ -77,7 +77,7 @@ impl fmt::Display for Line {
     }
 }
 
-/// Computes all results and passes each line to `line` as soon as it is known.
+/// Computes all results, and passes each to `line` as soon as it is computed.
 pub fn run(mut line: impl FnMut(Line)) {
     let mut total = Sha256::new();
     let digest = activations();
@@ -140,8 +140,9 @@ pub fn draw_genome(topology: Topology, mutations: u32, rng: &mut ChaCha8Rng) -> 
     genome
 }
 
-/// Draws the next reading, similar to those of a robot: half of the time the previous reading, a
-/// quarter of the time with one sensor changed, a quarter of the time a new random reading.
+/// Draws the next reading, similar to a robot's readings: half of the time, the previous reading; a
+/// quarter of the time, the previous reading with one sensor changed; a quarter of the time, a new
+/// random reading.
 #[must_use]
 pub fn draw_sensors(last: SensorBits, rng: &mut ChaCha8Rng) -> SensorBits {
     let word = rng.next_u32();

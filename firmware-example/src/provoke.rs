@@ -1,4 +1,4 @@
-//! Triggers faults to check that the wheels stop. For the `faults` programs, under QEMU only.
+//! Triggers faults to check that the wheels stop. Used by the `faults` programs, only under QEMU.
 //!
 //! Uses `unsafe`, because safe code cannot cause faults.
 #![allow(unsafe_code)]
@@ -26,11 +26,11 @@ const NO_PROGRAM: u32 = 0xe000_0001;
 /// masked, as if it occurred while the wheels are being set.
 ///
 /// # Panics
-/// If the fault is a panic, is unknown or does not occur.
+/// If the named fault is a panic, is unknown or does not occur.
 pub fn provoke() -> ! {
     let mut line = [0_u8; 64];
     let room: [u32; 2] = [line.as_mut_ptr() as u32, line.len() as u32];
-    // SAFETY: the host writes the line and its length within the buffer.
+    // SAFETY: the host writes the line, which fits in the buffer, and its length.
     unsafe {
         asm!("bkpt #0xab", inout("r0") GET_COMMAND_LINE => _, in("r1") room.as_ptr());
         asm!("cpsid i");

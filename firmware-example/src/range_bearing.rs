@@ -1,6 +1,6 @@
 //! Neighbours from a range-and-bearing module on a serial line.
 //!
-//! There is no standard protocol for such modules; builders can implement this one in a few lines.
+//! No standard protocol exists for such modules; builders can implement this one in a few lines.
 //! After each scan the module sends one frame, with the same framing as on the host's serial line
 //! (`00`, COBS of message and CRC-32C, `00`; see `docs/link-protocol.md`). The message is
 //!
@@ -10,8 +10,8 @@
 //! | 2 each | range in mm between the centres of the two robots, unsigned, little-endian |
 //! | 2 each | bearing in 1/65536 turn, signed, little-endian; counter-clockwise from straight ahead |
 //!
-//! with the range and the bearing of each neighbour next to each other. Scans without neighbours
-//! are sent too: silence means that the module is broken, and the robot stops.
+//! where each neighbour's bearing follows its range. Scans without neighbours are also sent: if the
+//! module sends nothing, the robot treats it as broken and stops.
 
 use core::f32::consts::PI;
 use minimal_surprise_controller::neighbours::{Detection, Neighbours};

@@ -2,8 +2,8 @@
 //!
 //! A panic calls a function that does not exist, so linking a program that contains a panic fails.
 //!
-//! Uses `unsafe` because that function must be declared, and because a board without a device
-//! consists only of addresses whose contents must be unknown to the compiler.
+//! Uses `unsafe` to declare that function, and to access the addresses that stand for a board; the
+//! compiler must not know their contents.
 #![no_std]
 #![allow(unsafe_code)]
 
@@ -31,13 +31,13 @@ const REGISTER: *mut u32 = 0x4000_0000 as *mut u32;
 
 /// Reads a value that the compiler does not know.
 pub fn read() -> u32 {
-    // SAFETY: the address of a device; this is never run.
+    // SAFETY: the address of a device; this code is never run.
     unsafe { ptr::read_volatile(REGISTER) }
 }
 
-/// Makes the compiler compute a value.
+/// Forces the compiler to compute a value.
 pub fn write(value: u32) {
-    // SAFETY: the address of a device; this is never run.
+    // SAFETY: the address of a device; this code is never run.
     unsafe { ptr::write_volatile(REGISTER, value) }
 }
 

@@ -1,5 +1,5 @@
-//! Prints the cost of the controller: instructions, memory and stack. Each line is a key of
-//! `budget.toml` and the maximum value measured.
+//! Prints the cost of the controller: instructions, memory and stack. Each line consists of a key
+//! of `budget.toml` and the maximum value measured.
 //!
 //! Runs under QEMU with `-icount`. The values depend on the compiler, so the expected
 //! output is not stored; the `budget` test compares them with `budget.toml`.
@@ -32,7 +32,7 @@ use rand_core::{Rng, SeedableRng};
 const INPUT_SETS: u32 = 1000;
 /// Number of steps of each genome that are counted.
 const STEPS_PER_GENOME: u32 = 100;
-/// Number of stack bytes used to test the measurement.
+/// Number of stack bytes used to test the stack measurement.
 const KNOWN_BYTES: usize = 400;
 
 // Starts the clock at reset: SysTick's reload value, its current value, then control (on, the
@@ -159,7 +159,7 @@ fn build(bytes: &[u8]) {
     }
 }
 
-/// Runs the code that a robot runs at its start.
+/// Runs the code that a robot runs at startup.
 #[inline(never)]
 fn start(flash: &mut MemoryFlash, room: &mut Buffer) -> Controller {
     let mut slots = Slots::open(flash, 0, room).expect("the slots fit");
@@ -173,7 +173,7 @@ fn open(flash: &mut MemoryFlash, room: &mut Buffer) {
     black_box(&start(flash, room));
 }
 
-/// Uses a known amount of stack, to detect wrong measurements.
+/// Uses a known amount of stack, so that wrong measurements are detected.
 #[inline(never)]
 fn known_depth() {
     black_box(&mut [black_box(1_u8); KNOWN_BYTES]);

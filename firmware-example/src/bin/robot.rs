@@ -6,9 +6,9 @@
 //!     -semihosting-config enable=on,target=native -kernel target/thumbv7em-none-eabihf/release/robot
 //! ```
 //!
-//! QEMU's first line of output names the serial port. Genomes are stored in `flash.bin` in the
-//! directory where QEMU is started; delete the file to reset the robot to its factory state. After
-//! the first line, the output is the robot's `defmt` log.
+//! QEMU's first line of output names the serial port. The rest is the robot's `defmt` log. Genomes
+//! are stored in `flash.bin` in the directory where QEMU is started; delete the file to reset the
+//! robot to its factory state.
 #![no_std]
 #![no_main]
 

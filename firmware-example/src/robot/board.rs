@@ -6,7 +6,7 @@ use minimal_surprise_link::Report;
 /// Maximum number of neighbours kept in one period.
 pub const NEIGHBOURS_MAX: usize = 16;
 
-/// Motion of the wheels until the next command.
+/// Motion of the robot until the next command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     /// No motion.
@@ -25,7 +25,7 @@ pub trait Board {
     const CELL_MM: f32;
 
     /// Adds the neighbours detected since the last call; returns true if the detector has delivered
-    /// data since then. If it has, and no neighbour was added, none is in range.
+    /// data since then. If it returns true without adding a neighbour, none is in range.
     fn detect(&mut self, neighbours: &mut Neighbours<NEIGHBOURS_MAX>) -> bool;
 
     /// Sets the motors.

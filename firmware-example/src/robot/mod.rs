@@ -1,12 +1,13 @@
 //! The firmware of a robot: the control loop, and the replies to the host.
 //!
-//! Once per control period: read neighbours, encode them as sensor bits, step, act, report. In
-//! between, the robot replies to its host. It does not move until the host starts it.
+//! Once per control period, the loop reads the neighbours, encodes them as sensor bits, steps the
+//! controller, acts and reports. Between periods, the robot replies to its host. The robot does not
+//! move until the host starts it.
 //!
 //! **Safety.** Whatever the genome decides, the robot
 //!
-//! - never drives into a cell that its sensors report occupied, or have not reported on since the
-//!   robot moved;
+//! - never drives into a cell that its sensors report as occupied, or about which they have
+//!   reported nothing since the robot moved;
 //! - stops while its newest neighbour data is older than [`DATA_PERIODS_MAX`] periods;
 //! - stops its motors before it writes to flash, which may stall the chip;
 //! - is restarted by the watchdog if it does not reach the end of its loop, and then does not move.
@@ -25,7 +26,7 @@ use minimal_surprise_link::{
 };
 use minimal_surprise_slots::{Buffer, Defect, PlaceError, Slot, SlotState, Slots, UpdateError};
 
-/// Maximum age of the neighbour data to act on, in control periods.
+/// Maximum age of neighbour data that the robot acts on, in control periods.
 pub const DATA_PERIODS_MAX: u32 = 2;
 
 /// Number of periods between two log lines of a running robot.
@@ -34,7 +35,7 @@ const LOG_PERIODS: u32 = 100;
 /// The sensor of the cell straight ahead, in every sensor model.
 const AHEAD: u16 = 1;
 
-/// Reason why a robot cannot start: its board or the location of its slots.
+/// The reason why a robot cannot start: its board or the location of its slots is invalid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StartError {
     /// The slots do not fit the flash.
@@ -43,7 +44,7 @@ pub enum StartError {
     Cell(InvalidCellSize),
 }
 
-/// A robot: its electronics, its genomes and its line to the host.
+/// A robot, with its electronics, its genomes and its line to the host.
 #[derive(Debug)]
 pub struct Robot<B, F> {
     server: Server,
@@ -140,12 +141,13 @@ impl<B: Board, F: NorFlash> Robot<B, F> {
         &mut self.body.board
     }
 
-    /// Takes a byte from the line and sends bytes; returns true if there was nothing to do.
+    /// Receives a byte from the line and sends bytes; returns true if there was nothing to do.
     fn talk(&mut self) -> bool {
         let answer = self.outgoing.get(self.sent..self.length).unwrap_or(&[]);
         for &byte in answer {
             if !self.body.board.send(byte) {
-                // No byte is taken until the reply is sent; the host waits for the reply.
+                // No byte is received until the reply has been sent, since the host waits for the
+                // reply.
                 return false;
             }
             self.sent += 1;
@@ -197,9 +199,9 @@ impl<B: Board, F: NorFlash> Body<B, F> {
         };
     }
 
-    /// Returns the motion of the robot: the decision, unless it might cause a collision. The cell
-    /// ahead counts as occupied unless the data of this period reports it free: the robot has moved
-    /// since older data was measured.
+    /// Returns the motion for a decision: the decided one, unless it might cause a collision. The
+    /// cell ahead counts as occupied unless the data of this period reports it as free: the robot
+    /// has moved since older data was measured.
     fn guarded(&mut self, decision: Decision) -> Motion {
         match (decision.action, decision.turn) {
             (Action::Straight, _) if self.data_periods > 0 || self.sensors.bits() & AHEAD != 0 => {
@@ -246,7 +248,7 @@ impl<B: Board, F: NorFlash> Body<B, F> {
         }
     }
 
-    /// Returns the refusal for a failed update; records a flash fault.
+    /// Returns the refusal for a failed update; if the flash failed, also records the fault.
     fn refusal(&mut self, error: UpdateError<F::Error>) -> Refusal {
         let refusal = refusal(&error);
         if refusal == Refusal::Flash {
@@ -307,7 +309,7 @@ impl<B: Board, F: NorFlash> Handler for Body<B, F> {
 
     fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal> {
         self.standing()?;
-        // The chip may stall for seconds, and the wheels would keep turning.
+        // The chip may stall for seconds, during which the wheels would keep turning.
         self.board.drive(Motion::Stop);
         let begun = self.slots.begin(length, crc);
         begun.map_err(|error| self.refusal(error))
@@ -325,7 +327,7 @@ impl<B: Board, F: NorFlash> Handler for Body<B, F> {
         let write_count = committed.map_err(|error| self.refusal(error))?;
         self.controller = self.slots.in_use(&mut self.room).controller();
         self.state = State::new(&self.controller);
-        // Sensor bits have a different meaning for a different model.
+        // Sensor bits have a different meaning in each sensor model.
         self.data_periods = DATA_PERIODS_MAX;
         self.sensors = SensorBits::NONE;
         Ok(write_count)

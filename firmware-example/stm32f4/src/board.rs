@@ -27,7 +27,7 @@ pub(crate) struct Stm32F4 {
     module: RangeBearing,
     /// The newest scan.
     scan: Neighbours<NEIGHBOURS_MAX>,
-    /// True until the loop has read the scan.
+    /// True if the loop has not read the scan yet.
     scan_is_new: bool,
 }
 
@@ -73,8 +73,8 @@ impl Board for Stm32F4 {
     }
 
     fn receive(&mut self) -> Option<u8> {
-        // `receive` is called more often than once per period, so the module's bytes do not pile
-        // up.
+        // `receive` is called more often than once per period, so the module's bytes do not
+        // accumulate.
         self.take_scans();
         interrupts::byte_from_line()
     }

@@ -83,7 +83,7 @@ impl ReadNorFlash for SlotFlash {
         Ok(())
     }
 
-    /// Returns the size in bytes, or 0 if the chip has less flash than expected.
+    /// Returns the size in bytes; 0 if the chip has less flash than expected.
     fn capacity(&self) -> usize {
         let end = (SLOTS_AT + SLOTS_BYTES) as usize;
         if self.chip.len() >= end {

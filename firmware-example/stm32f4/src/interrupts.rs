@@ -1,4 +1,4 @@
-//! Interrupts for events during the loop: arriving bytes and the start of control periods.
+//! Interrupts for events during the loop: received bytes and the start of control periods.
 //!
 //! Uses `unsafe` to unmask interrupts; this accesses no memory.
 #![allow(unsafe_code)]
@@ -18,8 +18,8 @@ use stm32f4xx_hal::serial::{Instance, Rx};
 
 use crate::wheels::Wheels;
 
-/// Maximum number of bytes kept until the loop takes them; larger than a frame on either line.
-/// Further bytes are lost, as if damaged on the line.
+/// Maximum number of bytes stored until the loop reads them; larger than a frame on either line.
+/// Further bytes are lost, as if they had been damaged on the line.
 const BYTES_MAX: usize = 256;
 
 /// State shared by the loop and the interrupts; `None` until initialised.
@@ -59,14 +59,14 @@ pub(crate) fn drive(motion: Motion) {
     with(&WHEELS, |wheels| wheels.drive(motion));
 }
 
-/// Starts to receive from the host's line and the range-and-bearing module.
+/// Starts receiving from the host's line and the range-and-bearing module.
 pub(crate) fn listen(mut line: Rx<USART2>, mut module: Rx<USART3>) {
     line.listen();
     module.listen();
     put(&LINE, Receiver::new(line));
     put(&MODULE, Receiver::new(module));
-    // SAFETY: nothing relies on these interrupts being masked; they access shared state through
-    // `with` only.
+    // SAFETY: nothing relies on these interrupts being masked; they access shared state only
+    // through `with`.
     unsafe {
         NVIC::unmask(Interrupt::USART2);
         NVIC::unmask(Interrupt::USART3);
@@ -96,8 +96,8 @@ pub(crate) fn sleep() {
             && nothing(with(&MODULE, |module| module.bytes.is_empty()))
             && !PERIOD_BEGUN.load(Ordering::Relaxed);
         if idle {
-            // An interrupt wakes the processor here and is taken after the critical section, so no
-            // interrupt is handled between the check and the sleep.
+            // An interrupt wakes the processor here and is handled after the critical section, so
+            // no interrupt is handled between the check and the sleep.
             asm::wfi();
         }
     });
@@ -135,8 +135,8 @@ fn USART3() {
     with(&MODULE, Receiver::receive);
 }
 
-/// Begins a control period. Stops wheels that have received no command for a whole period: the
-/// watchdog would take seconds to do so.
+/// Begins a control period. Stops the wheels if they have received no command for a whole period,
+/// since the watchdog would take seconds to stop them.
 #[exception]
 fn SysTick() {
     if PERIOD_BEGUN.swap(true, Ordering::Relaxed) {

@@ -32,8 +32,8 @@ use wheels::{PWM_HZ, Wheel, Wheels};
 /// Speed of both serial lines, in bits per second; 8 data bits, no parity, 1 stop bit.
 const BAUD: u32 = 115_200;
 
-/// The watchdog's time-out at its nominal clock. It must exceed the time to erase a sector (maximum
-/// 4 s) even at the fastest clock: 47 kHz instead of 32 kHz shortens the time-out to 5.4 s.
+/// The watchdog's time-out at its nominal clock. The time-out must exceed the time to erase a
+/// sector (at most 4 s) even at the fastest clock: 47 kHz instead of 32 kHz shortens it to 5.4 s.
 const WATCHDOG_MS: u32 = 8_000;
 
 /// SysTick's reload value; SysTick counts every eighth tick of the processor's clock.
@@ -86,7 +86,8 @@ fn main() -> ! {
     systick.enable_interrupt();
     systick.enable_counter();
 
-    // Lets a debugger read memory while the processor sleeps, and halt the processor for any time.
+    // Allows a debugger to read memory while the processor sleeps, and to halt the processor for
+    // any length of time.
     chip.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
     let mut watchdog = IndependentWatchdog::new(chip.IWDG);
     watchdog.stop_on_debug(&chip.DBGMCU, true);

@@ -1,7 +1,8 @@
-//! Two wheels driven by a motor driver that takes a speed (PWM) and a direction for each wheel.
+//! Two wheels, driven by a motor driver with a speed input (PWM) and a direction input for each
+//! wheel.
 //!
 //! The rotation of the wheels is not measured: the length of a move depends only on the constants
-//! here, which a builder must set first.
+//! in this file, which a builder must set first.
 
 use firmware_example::robot::Motion;
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
@@ -20,7 +21,7 @@ const TRACK_MM: f32 = 53.0;
 
 /// Duty of a move of one cell ahead, in 1/1000. A move takes one control period.
 const AHEAD: i16 = permille(CELL_MM * CONTROL_HZ as f32);
-/// Duty of a quarter turn on the spot, in 1/1000: each wheel travels a quarter of the circle whose
+/// Duty of a quarter turn on the spot, in 1/1000: each wheel travels a quarter of a circle whose
 /// diameter is the track.
 const TURN: i16 = permille(core::f32::consts::FRAC_PI_4 * TRACK_MM * CONTROL_HZ as f32);
 
