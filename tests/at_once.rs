@@ -1,5 +1,5 @@
 //! Many processes started simultaneously in one directory: none fails, no result is lost, and they
-//! leave the same files as a single process. `TEST_ALL=1` repeats this thousands of times.
+//! produce the same files as a single process. `TEST_ALL=1` repeats this thousands of times.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -29,7 +29,7 @@ steps = 20
 
 const RUN: &str = "suite own.toml run --out suite --threads 1 --progress none";
 
-/// Maximum duration of any operation here.
+/// Maximum duration of any operation in these tests.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Locking behaviour of a file system.
@@ -39,7 +39,7 @@ enum Locks {
     Working,
     /// The file system has no locks.
     Missing,
-    /// A host does not see the locks of other hosts, and each process is on a different host.
+    /// A host does not see the locks of other hosts, and each process runs on a different host.
     OfOneHost,
 }
 
@@ -82,7 +82,7 @@ fn other_locks() -> PathBuf {
     folder.path().join("locks.so")
 }
 
-/// Returns the number of repetitions: fewer unless all cases are requested.
+/// Returns the number of repetitions: `all` if all cases are requested, otherwise `reduced`.
 fn times(reduced: usize, all: usize) -> usize {
     if full::all_cases() { all } else { reduced }
 }
@@ -105,7 +105,7 @@ fn command(evolver: &Evolver, locks: Locks, line: &str) -> Command {
     command
 }
 
-/// Starts all these commands, and waits for them to exit.
+/// Starts all these commands and waits for them to exit.
 fn at_once(evolver: &Evolver, locks: Locks, lines: &[&str]) -> Vec<Output> {
     let start = |line: &&str| command(evolver, locks, line).spawn().expect("it starts");
     let started: Vec<Child> = lines.iter().map(start).collect();
@@ -121,8 +121,8 @@ fn assert_success(outputs: &[Output], what: &str) {
     }
 }
 
-/// Reads all files below a folder, including hidden ones, except those with the command and the
-/// duration of a run.
+/// Reads all files below a folder, including hidden files, but excluding those that contain the
+/// command and the duration of a run.
 fn contents(evolver: &Evolver, folder: &str) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files
@@ -269,7 +269,7 @@ fn a_run_held_by_a_stopped_process_is_waited_for_and_its_holder_is_named() {
         ("suite own.toml run --progress json", "KILL"),
     ] {
         let evolver = Evolver::in_empty_folder();
-        // A single run, long enough to be stopped.
+        // A single run that is long enough to be stopped.
         let long = SUITE
             .replace("runs = 6", "runs = 1")
             .replace("generations = 2", "generations = 100")

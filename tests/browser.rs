@@ -41,7 +41,7 @@ fn succeed(evolver: &Evolver, line: &str) -> Finished {
     run
 }
 
-/// Checks the exit code, 2 if the input is invalid or 1 if a run is damaged, and the words of the
+/// Checks the exit code (2 if the input is invalid, 1 if a run is damaged) and the words of the
 /// message.
 fn assert_refused(run: &Finished, code: i32, words: &[&str]) {
     assert_eq!(run.code, Some(code), "{run:?}");
@@ -51,7 +51,7 @@ fn assert_refused(run: &Finished, code: i32, words: &[&str]) {
     assert_eq!(run.stderr.trim_end().lines().count(), 1, "{run:?}");
 }
 
-/// Returns a browser; `None` if Chromium is not installed and the test may be skipped.
+/// Starts a browser; returns `None` if Chromium is not installed and the test may be skipped.
 fn browser() -> Option<Browser> {
     require(chromium()).map(|chromium| Browser::start(&chromium))
 }
@@ -190,7 +190,7 @@ fn a_page_whose_steps_differ_from_the_run_says_so() {
         .text("runs/run/final.json")
         .replace(recorded, &other);
     evolver.write("runs/run/final.json", changed.as_bytes());
-    // The program rejects such a run, but a page may be changed later.
+    // The program rejects such a run, but a page may be changed after it was written.
     assert_refused(
         &run(&evolver, "replay runs/run --html run.html"),
         1,
@@ -465,7 +465,7 @@ fn the_gallery_sorts_filters_and_opens_replays_with_the_keyboard() {
             "{control}: {reached:?}"
         );
     }
-    // The runs follow the last control; arrow keys move between runs.
+    // In tab order, the runs follow the last control; arrow keys move between runs.
     let _: Value = browser.evaluate("document.getElementById('sort').focus(), null");
     browser.press("Tab");
     browser.press("ArrowRight");
@@ -637,10 +637,10 @@ fn input_that_cannot_be_shown_is_refused_and_nothing_is_overwritten() {
             &format!("replay {name} --html out.html"),
             &[name, word],
         );
-        // For a gallery, a run that cannot be shown is one damaged run among several.
+        // In a gallery, a run that cannot be shown counts as a damaged run among others.
         refused_with(1, &format!("gallery {name} --out new"), &[name, word]);
     }
-    // Among other runs, an unfinished run is left out.
+    // An unfinished run among other runs is left out.
     fs::rename(
         evolver.folder().join("unfinished"),
         evolver.folder().join("runs/unfinished"),

@@ -36,7 +36,7 @@ const ROWS: [(&str, &str); 9] = [
     ),
 ];
 
-/// Row of the table.
+/// A row of the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Row {
     what: String,
@@ -65,7 +65,7 @@ fn budget() -> Vec<u32> {
     ROWS.iter().map(|(key, _)| most(*key)).collect()
 }
 
-/// Reads the README's table of costs, and the compiler that it names.
+/// Reads the README's table of costs and the name of the compiler used for it.
 fn readme() -> (Vec<Row>, String) {
     let text = text("../README.md");
     let (_, cost) = text.split_once("### Cost").expect("a section on costs");
@@ -165,7 +165,7 @@ fn no_panic_is_linked_into_a_robot() {
         return;
     };
     assert!(robot.success, "{}", robot.messages);
-    // A program with an unchecked index must fail to link; otherwise, the check above proves
+    // A program with an unchecked index must fail to link; otherwise, the check above would prove
     // nothing.
     let Some(panics) = require(link("probe", "panics")) else {
         return;

@@ -18,10 +18,10 @@ const SHORT: [(&str, &str); 6] = [
     ("--generations", "3"),
 ];
 
-/// Maximum wait for a process.
+/// Maximum time to wait for a process.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Waits until another process makes a condition true.
+/// Waits until another process has made a condition true.
 fn wait_until(what: &str, holds: impl Fn() -> bool) {
     let started = Instant::now();
     while !holds() {
@@ -50,7 +50,8 @@ fn short(flags: &[&str]) -> Vec<String> {
         .collect()
 }
 
-/// Asserts a single message with all these words, exit code 2, and that no file is written.
+/// Asserts that the program prints a single message with all these words, exits with code 2 and
+/// writes no file.
 fn assert_refused(evolver: &Evolver, arguments: &[String], words: &[&str]) {
     let before = evolver.files();
     let run = evolver.run(arguments);
@@ -510,7 +511,7 @@ fn a_signal_that_the_caller_ignores_stays_ignored() {
         let line = format!("trap '' {signal}; {program} {work} {signal} & echo $! > pid; wait $!");
         done(signal, line, signal);
     }
-    // Shells make background jobs ignore SIGINT.
+    // Shells start background jobs with SIGINT ignored.
     let job = format!("{program} {work} job & echo $! > pid; wait $!");
     done("job", job, "INT");
     let nohup = format!("nohup {program} {work} nohup > out 2>&1 & echo $! > pid; wait $!");
@@ -543,7 +544,7 @@ fn a_run_whose_output_is_closed_stops_unfinished_and_says_how_to_resume() {
     unfinished(&line, "head -1", "evolve --resume cut");
     let resumed = evolver.run(&["evolve", "--resume", "cut"]);
     assert_eq!(hash_of(&resumed), hash_of(&whole));
-    // The drawing is shown before the work begins, so the reader can close the pipe.
+    // The seed is printed before the work begins, so the reader can close the pipe.
     unfinished(
         &format!("{work} --out drawn"),
         "sleep 0",
@@ -560,7 +561,7 @@ fn a_run_whose_output_is_closed_stops_unfinished_and_says_how_to_resume() {
     assert!(finished.stdout.contains("6 of 6 runs done"), "{finished:?}");
 }
 
-/// Commands that print to standard output, in a folder with a run.
+/// Commands that print to standard output; run in a folder with a run.
 const PRINTING: [&str; 15] = [
     "--help",
     "--version",
@@ -604,7 +605,7 @@ fn a_full_disk_behind_standard_output_is_a_failure_and_no_panic() {
     let said = String::from_utf8_lossy(&piped.stderr);
     assert_eq!(piped.status.code(), Some(1), "{said}");
     assert!(said.contains("evolve --resume other-2"), "{said}");
-    // A full standard error does not cause a panic either.
+    // A full device behind standard error does not cause a panic either.
     let lines = short(&["--seed", "1", "--progress", "lines", "--out"]).join(" ");
     for (index, place) in ["/dev/full", "&-"].into_iter().enumerate() {
         for (command, code) in [
@@ -633,7 +634,7 @@ fn exit_codes_distinguish_bad_input_failures_and_interruptions() {
     let cases = [
         ("--version", 0),
         ("classify run", 0),
-        // A failure of a run or of the disk.
+        // Failures: damaged runs and disk errors.
         ("classify cut", 1),
         ("inspect cut", 1),
         ("replay cut --svg a.svg", 1),

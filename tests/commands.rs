@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tests::program::{Evolver, Finished};
 
-/// A line of four, a pair, and two robots that form no structure except dispersion.
+/// A line of four robots, a pair, and two robots that form no structure except dispersion.
 const DRAWING: &str = "
     ▲········
     ·········
@@ -470,7 +470,7 @@ fn a_drawing_from_the_terminal_is_classified_like_its_run() {
     );
 }
 
-/// Compiles and runs a program that prints the bytes of an exported genome, and returns the bytes.
+/// Compiles and runs a program that prints the bytes of an exported genome; returns these bytes.
 fn printed_by(evolver: &Evolver, compiler: &str, arguments: &[&str]) -> Vec<u8> {
     let run = |program: &Path, arguments: &[&str]| {
         let mut command = std::process::Command::new(program);
@@ -539,7 +539,7 @@ fn an_exported_genome_can_be_raw_or_intel_hex() {
         "probe-rs download --chip STM32F405RGTx --binary-format bin --base-address 0x0800c000 \
          raw.bin\n"
     );
-    // Without an output file, the genome file itself is the raw form.
+    // If no output file is given, the genome file itself is the raw form.
     let raw = export("bin");
     assert!(raw.stderr.ends_with(" run/best.genome\n"), "{raw:?}");
 

@@ -1,4 +1,4 @@
-//! One seed gives one result, whatever the threads, builds and interruptions.
+//! One seed gives one result, regardless of threads, builds and interruptions.
 
 use minimal_surprise_sim::EnginePath;
 use minimal_surprise_sim::engine::PATH_VARIABLE;
@@ -73,7 +73,7 @@ fn hash(evolver: &Evolver, arguments: &[&str], extra: &[&str]) -> String {
     evolver.text("run/DONE").trim().to_owned()
 }
 
-/// Reads all files of the run except those with the command and duration.
+/// Reads all files of the run except those that contain the command and the duration.
 fn contents(evolver: &Evolver) -> Vec<(String, String)> {
     let files = evolver.files().into_iter();
     files

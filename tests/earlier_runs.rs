@@ -22,7 +22,7 @@ const RUNS: [(&str, &[&str]); 6] = [
 const SHORT: &str = "evolve --grid 8x8 --robots 20 --population 4 --generations 3 --repetitions 2 \
                      --steps 20 --seed 1";
 
-/// Hash of the run in `unfinished`, completed without an interruption.
+/// Hash of the run in `unfinished` if it is completed without an interruption.
 const RESUMED: &str = "566d8dd58ecfaa36cb840a4c2db3546de9f10497c27f29a4d4af75d976f8968c";
 
 fn fixtures() -> PathBuf {
@@ -42,7 +42,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Returns the program in a folder with all files of the first release.
+/// Creates a folder with all files of the first release; returns the program in it.
 fn evolver() -> Evolver {
     let evolver = Evolver::in_empty_folder();
     copy(&fixtures(), evolver.folder());
@@ -71,7 +71,7 @@ fn six_short_runs_end_with_the_hashes_of_the_first_release() {
         assert_eq!(made.code, Some(0), "{name}: {made:?}");
         for file in ["DONE", "best.genome", "generations.csv", "config.toml"] {
             let [first, again] = [name, "again"].map(|run| evolver.read(&format!("{run}/{file}")));
-            // The path of the ancestor is stored as given.
+            // The path of the ancestor is stored as the user gave it.
             assert!(
                 first == again || (name, file) == ("from", "config.toml"),
                 "{name}: {file}"

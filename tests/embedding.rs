@@ -1,4 +1,4 @@
-//! Builds the README's code for embedding the controller without changes.
+//! Builds, without changes, the README's code that embeds the controller.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -39,7 +39,7 @@ fn the_readmes_embedding_code_builds_outside_the_repository() {
     }
     let genome = repository.join("controller/tests/b-predefined-line.genome");
     fs::copy(genome, robot.join("best.genome")).unwrap();
-    // The same versions as in the tests of the robot's firmware.
+    // Use the same versions as the robot's firmware.
     let versions = repository.join("firmware-example/Cargo.lock");
     fs::copy(versions, robot.join("Cargo.lock")).unwrap();
 

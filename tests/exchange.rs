@@ -1,5 +1,4 @@
-//! Text files of the program published by the paper's authors, in `fixtures/exchange`: read, rerun
-//! and written.
+//! Reads, reruns and writes the text files of the authors' program in `fixtures/exchange`.
 
 use minimal_surprise_controller::{Controller, Prediction, SensorModel, Template, Topology};
 use minimal_surprise_sim::exchange::{

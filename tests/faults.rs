@@ -1,10 +1,10 @@
-//! Every fault stops the wheels first. QEMU traces the writes to the wheels' registers.
+//! Every fault stops the wheels first. QEMU's trace shows the writes to the wheels' registers.
 
 use std::fs;
 use tests::firmware::{self, Faulted, fault_on_mps2, fault_on_stm32f4};
 use tests::tools::require;
 
-/// A fault, the emulated robot's log of it, and QEMU's report of it on the STM32F405.
+/// A fault, the emulated robot's log of it, and QEMU's report of it for the STM32F405.
 const FAULTS: [(&str, &str, &str); 8] = [
     ("panic", "on purpose", ""),
     (
@@ -45,7 +45,7 @@ fn the_emulated_robot_stops_its_wheels_first_in_every_fault() {
         };
         let Faulted { wheels, log } = faulted;
         assert!(log.contains(says), "{fault}: {log}");
-        // First both lights, then none.
+        // First both lights are on, then none.
         let [on, off] = &wheels[..] else {
             panic!("{fault}: {wheels:?}");
         };
@@ -82,7 +82,7 @@ fn the_stm32f4_stops_its_wheels_first_in_every_fault() {
     }
 }
 
-/// The stack is at the bottom of RAM, and [`firmware_example::faults`] makes accesses below it
+/// The stack is at the bottom of RAM, and [`firmware_example::faults`] makes accesses below RAM
 /// fail.
 #[test]
 fn the_stack_of_both_boards_is_at_the_start_of_ram() {

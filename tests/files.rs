@@ -11,7 +11,7 @@ use tests::disk::Disk;
 use tests::program::Evolver;
 use tests::tools;
 
-/// Maximum duration of any operation here.
+/// Maximum duration of any operation in these tests.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 const EVOLVE: [&str; 11] = [

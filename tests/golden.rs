@@ -1,5 +1,5 @@
-//! Compares our controller with the program published by the paper's authors, recorded in
-//! `fixtures/golden` (or the folder named by `GOLDEN_DIR`).
+//! Compares our controller with recordings of the program published by the paper's authors. The
+//! recordings are in `fixtures/golden` or in the folder named by `GOLDEN_DIR`.
 
 use minimal_surprise_controller::{Action, Controller, State};
 use minimal_surprise_sim::evaluation::run;

@@ -1,4 +1,4 @@
-//! A simulated swarm in which robot 0 is replaced by the firmware on an emulated robot.
+//! A simulated swarm in which the firmware on an emulated robot replaces robot 0.
 
 use minimal_surprise_controller::{Prediction, SensorModel, Topology};
 use std::path::Path;
@@ -32,7 +32,7 @@ fn a_swarm_with_the_emulated_robot_ends_with_the_hash_of_the_simulation() {
         let flashed = evolver.run(&["flash", &name, "--port", port]);
         assert_eq!(flashed.code, Some(0), "{flashed:?}");
         assert!(flashed.stdout.contains("running"), "{flashed:?}");
-        // Noise causes readings that would not occur in the swarm alone.
+        // Noise causes readings that would not occur without it.
         let flags = ["--steps", "500", "--seed", "3", "--noise", "0.05"];
         let hil = |mode: &[&str]| {
             let arguments = [&["hil", name.as_str()], mode, &flags].concat();
@@ -73,7 +73,7 @@ fn a_run_directory_provides_the_settings_to_run() {
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
-    // `hil` has left the robot running, as before.
+    // `hil` has left the robot running, as it was before.
     let steps = |second: &serde_json::Value| {
         let counts = ["straight", "turned_left", "turned_right"];
         counts

@@ -38,7 +38,7 @@ fn module(source: &Path, root: &Path) -> Vec<String> {
     module
 }
 
-/// Reads a file without comments and unit tests.
+/// Reads a file, leaving out comments and unit tests.
 fn code(source: &Path) -> String {
     let text = fs::read_to_string(source).unwrap();
     let text = text.split("#[cfg(test)]\nmod ").next().unwrap();

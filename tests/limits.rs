@@ -1,4 +1,4 @@
-//! Work that exceeds the machine's memory or disk is rejected before anything is written, and
+//! Work that exceeds the machine's memory or disk space is rejected before anything is written, and
 //! estimates are close to measurements.
 #![cfg(unix)]
 
@@ -25,7 +25,7 @@ use tests::program::{Evolver, Finished};
 use tests::{genome, tools};
 use wait4::Wait4;
 
-/// A tiny evolution whose settings are made large one at a time.
+/// A tiny evolution; tests make its settings large one at a time.
 const TINY: [(&str, &str); 6] = [
     ("grid", "5x5"),
     ("robots", "2"),
@@ -34,14 +34,14 @@ const TINY: [(&str, &str); 6] = [
     ("repetitions", "1"),
     ("steps", "1"),
 ];
-/// Number of threads of the program; each uses some memory.
+/// Number of the program's threads; each thread uses some memory.
 const THREADS: u32 = 2;
-/// Maximum duration of any operation here.
+/// Maximum duration of any operation in these tests.
 const PATIENCE: Duration = Duration::from_secs(120);
 /// Memory used by the program itself, in bytes.
 const PROGRAM: f64 = 16e6;
 
-/// Returns the arguments of the tiny evolution with these settings.
+/// Returns the arguments for the tiny evolution with these settings.
 fn evolve(settings: &[(&'static str, &str)]) -> Vec<String> {
     let tiny = TINY
         .iter()
@@ -81,7 +81,7 @@ fn words(line: &str) -> Vec<String> {
     line.split(' ').map(str::to_owned).collect()
 }
 
-/// Runs the program with limited address space.
+/// Runs the program with a limited address space.
 fn within(evolver: &Evolver, kilobytes: u32, arguments: &[String]) -> Finished {
     let output = Command::new("sh")
         .args(["-c", &format!("ulimit -v {kilobytes}; exec \"$@\""), "sh"])
@@ -354,7 +354,7 @@ fn the_files_of_a_run_have_nearly_the_estimated_sizes() {
     }
 }
 
-/// Writes a suite with the given number of runs.
+/// Writes a suite file with the given number of runs.
 fn suite(evolver: &Evolver, runs: u32, robots: u32) {
     let robots: Vec<String> = (1..=robots).map(|n| n.to_string()).collect();
     let text = format!(
@@ -367,7 +367,7 @@ fn suite(evolver: &Evolver, runs: u32, robots: u32) {
 
 /// Limit on the address space in kilobytes, too small for the suite's large run.
 const SHORT: u32 = 300_000;
-/// A suite with a single run that exceeds [`SHORT`], although it computes little.
+/// A suite with a single run that needs more than [`SHORT`], although the run computes little.
 const ONE_LARGE: &str = "
     name = \"own\"
     [[experiment]]
@@ -380,7 +380,7 @@ const ONE_LARGE: &str = "
     repetitions = 1
     steps = 1
 ";
-/// A small experiment, which fits.
+/// A small experiment, which fits into [`SHORT`].
 const ONE_SMALL: &str = "
     [[experiment]]
     name = \"small\"
@@ -463,7 +463,7 @@ fn work_that_exceeds_this_machine_is_refused_before_anything_is_written() {
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(refused.stderr.contains("steps = 1000000"), "{refused:?}");
     assert_eq!(evolver.files(), files, "{refused:?}");
-    // The scored bits of a single run overflow the counter; a replay has no population.
+    // The number of scored bits of a single run overflows the counter; a replay has no population.
     let endless =
         "replay run/best.genome --grid 16384x16384 --robots 268435456 --steps 4294967295 --svg a";
     let refused = evolver.run(&words(endless));
@@ -630,7 +630,7 @@ fn a_robot_whose_write_count_is_exhausted_says_so_and_no_export_creates_one() {
     let mut robot = LinkRobot::start(Flash::with_slot(&slot(&container, u32::MAX)));
     assert_eq!(robot.slots.write_count(), u32::MAX);
     assert_eq!(robot.begin(100, 0), Err(Refusal::CountExhausted));
-    // The remedy: after both slots are erased, the robot counts from 1 again.
+    // The remedy is to erase both slots: after that, the robot counts from 1 again.
     let mut flash = robot.stop();
     let end = Flash::OFFSET + 2 * Slots::<Flash>::SLOT_BYTES as u32;
     flash.erase(Flash::OFFSET, end).unwrap();

@@ -1,4 +1,4 @@
-//! Names, paths and files from users, passed through the whole program.
+//! Names, paths and files from users, as handled by the whole program.
 
 use minimal_surprise_evolution::text;
 use pulldown_cmark::{Event, Options, Parser, Tag};
@@ -281,7 +281,7 @@ fn two_exported_genomes_fit_into_one_firmware() {
     assert_refused(&raw, &["--name", "--format c"]);
 }
 
-/// Returns a text as saved by a Windows program.
+/// Converts a text to the form in which a Windows program saves it.
 fn of_windows(text: &str) -> Vec<u8> {
     format!("\u{feff}{}", text.replace('\n', "\r\n")).into_bytes()
 }
@@ -478,7 +478,7 @@ fn paths_that_are_not_utf_8_are_kept() {
         fs::canonicalize(folder).unwrap().join(bytes(b"r\xff"))
     );
 
-    // The settings contain the path of the ancestor, so that the same run can be repeated.
+    // The settings contain the path of the ancestor, so that the run can be repeated.
     let from = bytes(b"r\xff/best.genome");
     with("evolve small.toml --out s --from", from);
     done(evolver.run(&["evolve", "s/config.toml", "--out", "t"]));

@@ -1,5 +1,5 @@
 //! Commands for a robot on a serial port, tested with a robot and with other devices that may be
-//! connected to a port.
+//! connected to the port.
 #![cfg(target_os = "linux")]
 
 use minimal_surprise_controller::{KERNEL_ID, KernelId, SensorBits, Surprise, Topology};
@@ -21,7 +21,7 @@ use tests::link_robot::Flash;
 use tests::program::{Evolver, Finished};
 use tests::pty::{Answer, Device, Fault, PluggedRobot};
 
-/// Maximum wait for a command to exit.
+/// Maximum time to wait for a command to exit.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Creates a folder with two genomes for this kernel and one for a different kernel.
@@ -35,7 +35,7 @@ fn with_genomes() -> Evolver {
     evolver
 }
 
-/// Returns a robot that runs the old genome.
+/// Plugs in a robot that runs the old genome.
 fn with_the_old_genome(evolver: &Evolver, fault: Fault) -> PluggedRobot {
     let fresh = PluggedRobot::start(Flash::new(), Fault::None);
     let flashed = flash(evolver, "old.genome", &fresh.device.port);
@@ -455,7 +455,8 @@ fn a_robot_whose_write_count_is_exhausted_says_what_to_do_and_is_restored() {
 fn after_a_refusal_halfway_the_robot_is_restored() {
     let evolver = with_genomes();
     let chunks = evolver.read("new.genome").len().div_ceil(128) as u64;
-    // Request 1 stops, request 2 begins or resets; the chunks and the commit, or steps, follow.
+    // Request 1 stops the robot, and request 2 begins an update or resets the controller; the
+    // chunks and the commit, or the steps, follow.
     let refused = [
         (
             "flash",
@@ -508,13 +509,14 @@ fn after_a_refusal_halfway_the_robot_is_restored() {
 #[test]
 fn a_line_unplugged_halfway_leaves_the_old_genome_in_use() {
     let evolver = with_genomes();
-    // Request 1 stops, request 2 begins, the others are chunks; the last one commits.
+    // Request 1 stops the robot, request 2 begins the update, the others send chunks, and the last
+    // request commits.
     for done in 1..=6 {
         for (fault, words) in [
             (Fault::PulledAfter(done), "the line failed"),
             (Fault::MuteAfter(done), "stopped replying"),
         ] {
-            // An erase has the longest time-out, so this case is tested only on request.
+            // The time-out of an erase is the longest, so this case is tested only on request.
             if fault == Fault::MuteAfter(2) && !full::all_cases() {
                 continue;
             }
@@ -570,7 +572,7 @@ fn a_commit_whose_answer_is_lost_is_detected() {
     assert!(crc_in_use(&robot).contains(&new));
 }
 
-/// Returns the line that shows how to start a robot on this port.
+/// Returns the message that shows how to start a robot on this port.
 fn start_line(port: &str) -> String {
     format!("the robot may still be stopped; start it with: evolver start --port {port}")
 }
@@ -609,7 +611,7 @@ fn every_command_ends_although_another_program_reads_the_port() {
     let one = |kind: usize, bytes: usize| {
         let robot = with_the_old_genome(&evolver, Fault::None);
         let port = robot.device.port.clone();
-        // Reads all bytes at once, or a few at a time.
+        // The other program reads all bytes at once, or a few at a time.
         let read = match bytes {
             0 => "exec cat <$0".to_owned(),
             bytes => format!("while dd bs={bytes} count=1 <$0 2>&1; do :; done"),
@@ -626,7 +628,8 @@ fn every_command_ends_although_another_program_reads_the_port() {
         };
         let running = evolver.start(&arguments);
         if !full::all_cases() {
-            // With the other reader still running, the request to begin would be repeated for 50 s.
+            // If the other reader were still running, the request to begin would be repeated for 50
+            // s.
             thread::sleep(Duration::from_secs(4));
             other.kill().unwrap();
         }
@@ -705,7 +708,7 @@ fn wait_applies_only_to_the_first_answer() {
                 let run = evolver.run(&["flash", "new.genome", "--port", port, "--wait", wait]);
                 let waited = started.elapsed().as_secs_f64();
                 assert_failed(&run, &["the robot stopped replying while it was receiving"]);
-                // Five attempts of half a second.
+                // Five attempts of half a second each.
                 assert!((2.5..20.0).contains(&waited), "{wait}: {waited}");
             });
         }
@@ -765,7 +768,7 @@ fn ctrl_c_during_hil_restores_the_robot() {
 #[test]
 fn a_second_ctrl_c_ends_at_once_and_says_how_to_start_the_robot() {
     let evolver = with_genomes();
-    // The request to begin has been sent, and the program waits for the reply.
+    // The request to begin has been sent, and the program is waiting for the reply.
     let robot = with_the_old_genome(&evolver, Fault::MuteAfter(3));
     robot.robot().start().unwrap();
     let port = robot.device.port.as_str();

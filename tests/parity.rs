@@ -1,5 +1,5 @@
-//! The controller computes the same bits on an emulated Cortex-M4 as on the host, and stays within
-//! its instruction budget on it.
+//! On an emulated Cortex-M4, the controller computes the same bits as on the host and stays within
+//! its instruction budget.
 
 use firmware_example::parity;
 use minimal_surprise_controller::KERNEL_ID;
@@ -22,7 +22,7 @@ fn expected_lines() -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// Builds the firmware and returns it with the log of one of its programs.
+/// Builds the firmware; returns it and the log of one of its programs.
 fn logged(program: &str) -> Option<(Firmware, Vec<String>)> {
     let both = firmware::build().and_then(|firmware| {
         let lines = firmware.run(program)?;

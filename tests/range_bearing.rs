@@ -14,7 +14,7 @@ fn frame(message: &[u8]) -> Vec<u8> {
     wire[..length].to_vec()
 }
 
-/// Bytes serialised without their length.
+/// Bytes that are serialised without their length.
 struct Raw<'a>(&'a [u8]);
 
 impl serde::Serialize for Raw<'_> {
@@ -50,7 +50,8 @@ fn feed(bytes: &[u8]) -> (usize, Vec<Detection>) {
 
 #[test]
 fn a_scan_is_read_byte_for_byte_as_documented() {
-    // Two neighbours: 258 mm to the left, 100 mm behind on the right. CRC-32C, low byte first.
+    // Two neighbours: one 258 mm to the left, one 100 mm behind on the right. CRC-32C, low byte
+    // first.
     let bytes = [2, 2, 1, 0, 0x40, 100, 0, 0, 0xa0];
     let expected = [(258.0, FRAC_PI_2), (100.0, -3.0 * FRAC_PI_4)];
     let expected = expected.map(|(range_mm, bearing_rad)| Detection {
@@ -112,7 +113,7 @@ proptest! {
         let bit = bit.index(8 * bytes.len());
         bytes[bit / 8] ^= 1 << (bit % 8);
         let (scans, detections) = feed(&bytes);
-        // A zero before the frame only ends the bytes before it.
+        // A zero before the frame only ends the bytes that precede it.
         prop_assert!(scans == 0 && detections.is_empty() || scans == 1 && bit < 8);
     }
 

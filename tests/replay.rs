@@ -1,4 +1,4 @@
-//! Pictures of a run: `evolver replay` into SVG, PNG, GIF and MP4.
+//! Pictures of a run: `evolver replay` writes SVG, PNG, GIF and MP4.
 //!
 //! `UPDATE_SNAPSHOTS=1` rewrites the files in `snapshots/`; check them before committing.
 
@@ -43,7 +43,7 @@ fn assert_ended(run: &Finished, code: i32, words: &[&str]) {
     assert_eq!(run.stderr.trim_end().lines().count(), 1, "{run:?}");
 }
 
-/// Red, green and blue of every pixel, row by row.
+/// Red, green and blue values of every pixel, row by row.
 #[derive(Clone, PartialEq, Eq)]
 struct Pixels {
     width: usize,
@@ -72,7 +72,8 @@ fn png_pixels(bytes: &[u8]) -> (Pixels, Option<u32>) {
     (pixels, per_metre)
 }
 
-/// Returns every frame of a GIF as displayed, and its duration in hundredths of a second.
+/// Returns every frame of a GIF as it is displayed, with the frame's duration in hundredths of a
+/// second.
 fn gif_frames(bytes: &[u8]) -> Vec<(Pixels, u16)> {
     let mut reader = gif::DecodeOptions::new().read_info(bytes).expect("a GIF");
     let width = usize::from(reader.width());
@@ -201,10 +202,10 @@ const CELL: [u8; 3] = [0xf4, 0xf4, 0xf2];
 const LINE: [u8; 3] = [0xdc, 0xdc, 0xd8];
 const ROBOT: [u8; 3] = [0x2b, 0x2b, 0x29];
 
-/// Reads the poses from a frame of a grid with cells of the given size in pixels, robots drawn
-/// plain.
+/// Reads the poses from a frame. The grid's cells have the given size in pixels, and the robots are
+/// drawn plain.
 fn poses_seen(frame: &Pixels, cells: (usize, usize), side: usize) -> Vec<Pose> {
-    // The first pixel of the grid belongs to a line.
+    // The first pixel of the grid belongs to a grid line.
     let corner = frame.rgb.iter().position(|&colour| colour == LINE);
     let corner = corner.expect("there is a grid");
     let (west, north) = (corner % frame.width, corner / frame.width);
@@ -217,7 +218,8 @@ fn poses_seen(frame: &Pixels, cells: (usize, usize), side: usize) -> Vec<Pose> {
                     north + (cells.1 - 1 - y) * side + down * side / 4,
                 )
             };
-            // East, north, west, south; the outline of a robot has a notch at the back.
+            // The order is east, north, west, south; the outline of a robot has a notch at the
+            // back.
             let around = [(3, 2), (2, 1), (1, 2), (2, 3)].map(|(x, y)| quarter(x, y));
             if quarter(2, 2) == ROBOT {
                 let ahead: Vec<usize> = (0..4)
@@ -343,7 +345,8 @@ fn stand_in(evolver: &Evolver, script: &str) -> String {
 #[test]
 fn ffmpeg_gets_the_frames_of_the_gif() {
     let evolver = with_a_run();
-    // The last argument is the file; the script needs only shell builtins and programs in /bin.
+    // The last argument is the output file; the script needs only shell builtins and programs in
+    // /bin.
     let keeps = "#!/bin/sh\nfor file; do :; done\n/bin/cat > \"$file\"\n";
     let path = stand_in(&evolver, keeps);
     let flags = "replay run --gif a.gif --mp4 a.mp4 --every 20 --fps 7";
@@ -456,7 +459,7 @@ fn requests_for_what_a_run_does_not_have_are_refused() {
         assert_refused(&run, words_of_it);
         assert!(!evolver.folder().join("a").exists(), "{line}");
     }
-    // Flags for pictures, without a picture.
+    // Flags for pictures, but no picture is requested.
     for flag in ["--at 3", "--every 2", "--what state", "--dpi 200"] {
         let run = evolver.run(&words(&format!("replay run {flag}")));
         assert_eq!(run.code, Some(2), "{run:?}");
@@ -476,7 +479,8 @@ fn an_incomplete_run_directory_is_refused() {
             None => fs::remove_file(&path).unwrap(),
         }
         let run = evolver.run(&words("replay run --svg a.svg"));
-        // Without DONE, the run is incomplete; any other missing file is damage.
+        // If DONE is missing, the run is incomplete; if any other file is missing, the run is
+        // damaged.
         let code = if file == "DONE" { 2 } else { 1 };
         assert_ended(&run, code, words_of_it);
         fs::write(&path, good).unwrap();
@@ -704,7 +708,7 @@ fn a_damaged_swarm_is_named_after_its_structure_before_the_damage() {
     let classified: serde_json::Value =
         serde_json::from_str(&classified.stdout).expect("it is JSON");
     let name = classified["names"][0].as_str().expect("it has a name");
-    // If most of a swarm is removed, the rest is too small to have a dominant structure.
+    // If most of a swarm is removed, the remaining robots are too few to have a dominant structure.
     replay(&evolver, "run --remove 0,0,14,11 --svg a.svg --html a.html");
     assert!(
         evolver
@@ -781,7 +785,7 @@ fn a_noisy_run_of_the_first_version_is_checked_with_the_bits_that_it_hashed() {
         let run = evolver.run(&words(line));
         assert_eq!(run.code, Some(0), "{line}: {run:?}");
     }
-    // Declared as version 2, the same hash belongs to a different run.
+    // If the hash is declared as version 2, it belongs to a different run.
     let state = evolver.text("run/final.json");
     let state = state.replace("\"steps_hash\"", "\"steps_hash_v2\"");
     evolver.write("run/final.json", state.as_bytes());

@@ -65,15 +65,15 @@ fn assert_refused(run: &Finished, words: &[&str]) {
     assert_eq!(run.stdout, "", "{run:?}");
 }
 
-/// Returns the contents of a cell on the screen: the mark on the left, and the character in the
-/// cell.
+/// Returns the contents of a cell on the screen: the mark to the left of the cell, and the
+/// character in the cell.
 fn cell(terminal: &Terminal, grid: Grid, x: u16, y: u16) -> (String, String) {
     let row = TITLE as u16 + grid.height() - 1 - y;
     let at = |column| terminal.screen().cell(row, column).unwrap().contents();
     (at(2 * x).to_owned(), at(2 * x + 1).to_owned())
 }
 
-/// Returns the swarm on the screen, with filled arrows.
+/// Returns the swarm on the screen, drawn with filled arrows.
 fn swarm(terminal: &Terminal, grid: Grid) -> String {
     let arrows = [("▷▸", "▶"), ("△▴", "▲"), ("◁◂", "◀"), ("▽▾", "▼")];
     let rows = (0..grid.height()).rev().map(|y| {
@@ -215,7 +215,7 @@ fn a_selected_robot_shows_what_it_senses_and_what_it_had_predicted() {
     terminal.after("p", "robot 1 at");
     terminal.after(END, "expects");
     assert!(terminal.screen().contents().contains('○'));
-    // Without a pause, Escape and the next key would be read as a single key.
+    // If no pause followed, Escape and the next key would be read as a single key.
     terminal.types(ESCAPE);
     terminal.wait_while("robot 1 at");
     terminal.after(HOME, "step  0 of 60");
@@ -241,7 +241,7 @@ fn a_window_smaller_than_the_grid_says_which_part_it_shows_and_scrolls() {
     terminal.after("n", "cropped");
     terminal.after(RIGHT, "step  1 of 60");
     terminal.after(LEFT, "step  0 of 60");
-    // The robot is the arrow in reverse video.
+    // The selected robot is the arrow in reverse video.
     let inverse = |terminal: &Terminal| {
         let mut cells = (0..60).flat_map(|x| (0..12).map(move |y| (y, x)));
         cells.any(|(y, x)| {
@@ -360,7 +360,7 @@ fn evolve_opens_the_replay_of_its_run_and_prints_its_summary() {
     let summary = terminal.screen().contents();
     assert!(summary.contains("evolver replay run"), "{summary}");
 
-    // A complete run opens immediately.
+    // The replay of a complete run opens immediately.
     let again = ["evolve", "--resume", "run", "--open"];
     let mut terminal = Terminal::start(&evolver, (60, 100), &[], &again);
     terminal.wait_for("q quit");
@@ -479,14 +479,14 @@ fn every_command_works_in_windows_of_any_size() {
         assert_eq!(terminal.ended(), 0, "{rows}x{columns}");
         assert!(terminal.is_restored(), "{rows}x{columns}");
     }
-    // A progress bar leaves no text behind, even if it was truncated.
+    // A progress bar leaves no text on the screen, even if the bar was truncated.
     let arguments: Vec<&str> = evolve("narrow").collect();
     let mut terminal = Terminal::start(&evolver, (40, 20), &[], &arguments);
     assert_eq!(terminal.ended(), 0);
     let rows = terminal.rows().join("\n");
     assert!(!rows.contains("/2  best"), "{rows}");
     assert!(rows.contains("(a 15x15 grid is too"), "{rows}");
-    // The small terminal leaves out only the drawing.
+    // In a small terminal, only the drawing is left out.
     let piped = evolver.run(&evolve("piped").collect::<Vec<_>>()).stdout;
     let piped = piped.replace("piped", "narrow");
     assert_tells_all(&terminal.sent(), &piped, &["fitness", "hash"]);
@@ -496,8 +496,8 @@ fn every_command_works_in_windows_of_any_size() {
     assert_tells_all(&sent, &piped, &["fitness", "clustering"]);
 }
 
-/// Asserts that a terminal shows all lines that the program prints to a pipe, including these
-/// words.
+/// Asserts that the program prints these words to a pipe, and that a terminal shows all lines that
+/// are printed to a pipe.
 fn assert_tells_all(sent: &str, piped: &str, words: &[&str]) {
     for word in words {
         assert!(piped.contains(word), "no {word:?} in {piped}");

@@ -1,4 +1,4 @@
-//! The robot's control loop on a mock board: it is safe without a host.
+//! The robot's control loop on a mock board: the robot is safe even without a host.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use firmware_example::memory_flash::MemoryFlash;
@@ -12,7 +12,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// An operation of the robot on its board or its flash.
+/// An operation that the robot performs on its board or its flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Event {
     Drive(Motion),
@@ -25,7 +25,8 @@ type Events = Rc<RefCell<Vec<Event>>>;
 
 #[derive(Debug, Default)]
 struct TestBoard {
-    /// Detector reading of the next period: true if a robot is ahead; `None` without a reading.
+    /// Detector reading of the next period: true if a robot is ahead; `None` if there is no
+    /// reading.
     reading: Option<bool>,
     arriving: VecDeque<u8>,
     period: bool,
@@ -86,7 +87,7 @@ impl Board for TestBoard {
     fn log(&mut self, _: &Report) {}
 }
 
-/// Flash that records its erases and writes.
+/// A flash that records erases and writes.
 #[derive(Debug, Default)]
 struct TestFlash {
     memory: MemoryFlash,
@@ -132,8 +133,8 @@ fn start(memory: MemoryFlash) -> TestRobot {
     Robot::start(board, TestFlash { memory, events }, 0).unwrap()
 }
 
-/// Returns the container of a genome that always goes straight: all action weights make the output
-/// negative.
+/// Returns the container of a genome that makes a robot always go straight: all action weights make
+/// the output negative.
 fn straight() -> Vec<u8> {
     let topology = Topology::default();
     let shape = topology.action_shape();
@@ -141,7 +142,7 @@ fn straight() -> Vec<u8> {
     let weights = (0..topology.weights()).map(|index| {
         let outputs = 2 * inputs + hidden * shape.hidden_row();
         match index {
-            // Thresholds of −1 make every input neuron positive, whatever the readings.
+            // Thresholds of −1 make every input neuron positive for all readings.
             index if index < 2 * inputs => [0, -4096][index % 2],
             index if index < outputs => 4096,
             index if index < outputs + hidden => -4096,
@@ -166,7 +167,7 @@ fn robot_that_turns() -> TestRobot {
     start(MemoryFlash::new())
 }
 
-/// Sends requests of a new session.
+/// Sends requests in a new session.
 fn ask(robot: &mut TestRobot, session: u32, requests: &[Request<'_>]) {
     for index in 0..=requests.len() {
         let mut client = Client::new(session, 1);
@@ -263,7 +264,7 @@ fn the_motors_are_stopped_before_an_erase_and_stay_stopped_during_writes() {
         written.iter().all(|event| *event == Event::Write),
         "{written:?}"
     );
-    // The update installed a genome that goes straight.
+    // The update has installed the genome that goes straight.
     ask(&mut robot, 5, &[Request::Start]);
     assert_eq!(period(&mut robot, Some(false)), Some(Motion::Ahead));
 }
@@ -294,7 +295,7 @@ fn communication_does_not_feed_the_watchdog() {
     assert_eq!(robot.board().events(), []);
 }
 
-/// Returns the faults in the robot's identity, and those in its telemetry.
+/// Returns the faults in the robot's identity and the faults in its telemetry.
 fn faults(robot: &mut TestRobot) -> [Faults; 2] {
     let mut client = Client::new(1, 1);
     [Request::Identify, Request::Telemetry].map(|request| {

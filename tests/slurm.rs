@@ -1,7 +1,7 @@
-//! Suites on a real Slurm cluster of three nodes; nodes fail, and tasks are terminated and
+//! Suites on a real Slurm cluster of three nodes. Nodes fail, and tasks are terminated and
 //! restarted.
 //!
-//! Runs only with `TEST_ALL=1`, as root, and if Slurm is installed.
+//! The tests run only with `TEST_ALL=1`, as root, and if Slurm is installed.
 #![cfg(target_os = "linux")]
 
 use std::collections::BTreeMap;
@@ -32,13 +32,14 @@ repetitions = 4
 steps = 300
 ";
 
-/// Maximum duration of any operation. A failed node's task is restarted after half a minute.
+/// Maximum duration of any operation. The task of a failed node is restarted after half a minute.
 const PATIENCE: Duration = Duration::from_secs(180);
 
-/// Allows only one cluster at a time: two would be slower.
+/// Allows only one cluster at a time, since two would be slower.
 static ONE_CLUSTER: Mutex<()> = Mutex::new(());
 
-/// A cluster. Dropping it, or the end of this process, stops it and everything that runs on it.
+/// A cluster. The cluster and everything that runs on it stop when it is dropped or this process
+/// exits.
 struct Slurm {
     script: Child,
     input: Option<ChildStdin>,
@@ -111,7 +112,8 @@ impl Slurm {
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
-    /// Returns the state, node and reason of the array's unfinished tasks, by task number.
+    /// Returns the state, node and pending reason of each unfinished task of the array, by task
+    /// number.
     fn tasks(&self, job: &str) -> BTreeMap<u32, [String; 3]> {
         let format = "--format=%K|%T|%N|%r";
         let text = self.ask(&["squeue", "--noheader", "--array", "--jobs", job, format]);
@@ -153,13 +155,13 @@ impl Slurm {
             .collect()
     }
 
-    /// Runs the program with this cluster.
+    /// Runs the program so that it uses this cluster.
     fn evolver(&self, evolver: &Evolver, arguments: &[&str]) -> Finished {
         let conf = self.conf.to_string_lossy();
         evolver.run_with(("SLURM_CONF", conf.as_ref()), arguments)
     }
 
-    /// Submits the suite as the given number of tasks; returns the job number.
+    /// Submits the suite as `shards` tasks; returns the job number.
     fn submit(&self, evolver: &Evolver, shards: &str) -> String {
         let submit = format!("suite own.toml submit --engine slurm --shards {shards} --out suite");
         let run = self.evolver(evolver, &submit.split(' ').collect::<Vec<_>>());
@@ -178,7 +180,7 @@ impl Drop for Slurm {
                 text.lines().skip(from).for_each(|line| println!("{line}"));
             }
         }
-        // The script stops everything when its input ends.
+        // The script stops the whole cluster when its input ends.
         self.input = None;
         let _ = self.script.wait();
     }
@@ -191,7 +193,7 @@ fn installed() -> Result<(), Missing> {
         )))
     };
     for program in ["slurmctld", "slurmd", "sbatch", "munged"] {
-        // The program only has to start: without a cluster, some commands fail.
+        // The programs only have to start: without a cluster, some of them fail.
         if Command::new(program).arg("-V").output().is_err() {
             return missing(&format!(
                 "{program} (packages slurmctld slurmd slurm-client munge)"
@@ -241,7 +243,7 @@ fn hash(evolver: &Evolver) -> String {
         .to_owned()
 }
 
-/// Reads all files of the runs except `meta.json`, which holds the command, and `time.json`.
+/// Reads all files of the runs except `meta.json`, which contains the command, and `time.json`.
 fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files
@@ -373,7 +375,7 @@ fn tasks_that_a_real_slurm_terminates_and_requeues_continue_without_loss() {
             .iter()
             .any(|file| file.ends_with("/checkpoint"))
     });
-    // The same signal as at a time limit.
+    // This is the signal that Slurm sends at a time limit.
     slurm.ask(&["scancel", "--signal=TERM", "--batch", &format!("{job}_0")]);
     until("the end of the terminated task", || {
         !slurm.tasks(&job).contains_key(&0)
@@ -386,7 +388,7 @@ fn tasks_that_a_real_slurm_terminates_and_requeues_continue_without_loss() {
             .contains("interrupted")
     );
 
-    // Requeues a task that has ended, and one that may still be running.
+    // Requeue a task that has ended and a task that may still be running.
     slurm.ask(&["scontrol", "requeue", &format!("{job}_0")]);
     slurm.ask(&["scontrol", "requeue", &format!("{job}_1")]);
     until("the array's end", || {
@@ -429,7 +431,7 @@ fn a_shard_that_a_real_slurm_runs_twice_at_once_gives_the_result_of_one() {
         let runs_now =
             |tasks: &BTreeMap<u32, [String; 3]>| tasks.values().any(|task| task[0] == "RUNNING");
         at_once |= tasks.iter().all(runs_now);
-        // As on a file system without locks, where no process sees the locks of others.
+        // This simulates a file system without locks, where no process sees the locks of others.
         for run in fs::read_dir(&runs).into_iter().flatten().flatten() {
             let _ = fs::remove_file(run.path().join(".lock"));
         }

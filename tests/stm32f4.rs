@@ -6,7 +6,7 @@ use firmware_example::stm32f4::{
 use std::fs;
 use tests::firmware;
 
-/// Sectors of a chip with 1 MiB, in KiB (RM0090, table 5).
+/// Sizes of the sectors of a chip with 1 MiB, in KiB (RM0090, table 5).
 const SECTORS_KIB: [u32; 12] = [16, 16, 16, 16, 64, 128, 128, 128, 128, 128, 128, 128];
 
 #[test]

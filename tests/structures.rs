@@ -1,8 +1,9 @@
 //! Compares our counts with those of the scripts published by the paper's authors, for the states
-//! in `fixtures/structures` (or in the file named by `STRUCTURES_FILE`).
+//! in `fixtures/structures` or in the file named by `STRUCTURES_FILE`.
 //!
-//! Our rules differ on purpose in two points, both at the edge of the torus. [`EdgeRules`] also
-//! implements the scripts' rules, so that every difference can be attributed to a rule.
+//! Our rules deliberately differ from the scripts' rules in two points, both at the edge of the
+//! torus. [`EdgeRules`] also implements the scripts' rules, so that every difference can be
+//! attributed to a rule.
 
 use minimal_surprise_sim::scenario::random_poses;
 use minimal_surprise_sim::structures::{Structure, classify};
@@ -17,7 +18,7 @@ type Cell = (u16, u16);
 /// rules.
 #[derive(Clone, Copy)]
 struct EdgeRules {
-    /// Neighbours beside a line or pair are adjacent across the edge.
+    /// Neighbours beside a line or pair may also be adjacent across the edge.
     neighbours_adjacent_across: bool,
     /// A run across the edge may still contain a line after its outward robots are dropped. The
     /// scripts lose the line if all robots before the edge are dropped.
@@ -29,7 +30,7 @@ const OURS: EdgeRules = EdgeRules {
     dropped_lines_stay_whole: true,
 };
 
-/// An independent implementation, slow and simple, which finds lines and pairs cell by cell.
+/// A slow, simple and independent implementation that finds lines and pairs cell by cell.
 struct PlainReading<'a> {
     grid: Grid,
     headings: BTreeMap<Cell, Heading>,
@@ -46,7 +47,7 @@ struct Track {
 }
 
 impl Track {
-    /// Returns the cell at a position along the track, `aside` cells beside it.
+    /// Returns the cell at a position along the track, shifted sideways by `aside` cells.
     fn cell(self, grid: Grid, along: u16, aside: i32) -> Cell {
         if self.horizontal {
             grid.moved(along % self.length, self.across, 0, aside)
@@ -86,8 +87,8 @@ impl PlainReading<'_> {
         }
     }
 
-    /// Counts lines, pairs and dispersed robots independently; all other counts, which the rules do
-    /// not affect, come from the library.
+    /// Counts lines, pairs and dispersed robots independently. All other counts come from the
+    /// library, since the rules do not affect them.
     fn counts(&self) -> Counts {
         let structures = classify(self.grid, &self.state.poses).unwrap();
         let mut counts = Counts::of(&structures);
@@ -155,7 +156,7 @@ impl PlainReading<'_> {
         self.headings.get(&track.cell(self.grid, along, 0)).copied()
     }
 
-    /// Returns the lines of a track as first position and length.
+    /// Returns the first position and the length of each line on a track.
     fn lines(&self, track: Track) -> Vec<(u16, u16)> {
         let on_track = |along| {
             let heading = self.heading(track, along);
@@ -200,8 +201,8 @@ impl PlainReading<'_> {
         (!lost).then_some((from, to - from))
     }
 
-    /// Checks the cells beside n robots: at most ⌈n/2⌉ are occupied, and no two of these are
-    /// adjacent.
+    /// Checks that at most ⌈n/2⌉ of the cells beside n robots are occupied, and that no two
+    /// occupied cells are adjacent.
     fn side_is_free(&self, track: Track, first: u16, length: u16, aside: i32) -> bool {
         let beside = |along| self.occupied(track.cell(self.grid, along, aside));
         let count = (first..first + length)
@@ -241,7 +242,8 @@ impl PlainReading<'_> {
     }
 }
 
-/// Compares counts; returns the numbers of compared and equal counts, and the states that differ.
+/// Compares counts; returns the numbers of compared counts and of equal counts, and the states
+/// whose counts differ.
 fn compare(states: &[State], ours: impl Fn(&State) -> Counts) -> (usize, usize, Vec<&State>) {
     let (mut compared, mut equal, mut differing) = (0, 0, Vec::new());
     for state in states {

@@ -1,5 +1,5 @@
-//! Suites, run as a user would run them: the result is the same on one machine or several, with or
-//! without interruptions.
+//! Suites, run as a user would run them: the result is the same on one machine and on several, with
+//! and without interruptions.
 
 use minimal_surprise_evolver::suite::plan::Plan;
 use minimal_surprise_evolver::suite::{Suite, report};
@@ -53,7 +53,7 @@ fn hash_by_status(evolver: &Evolver) -> String {
     hash_by(evolver, &[])
 }
 
-/// Returns the hash of some runs, as printed by `status`.
+/// Returns the hash of the chosen runs, as printed by `status`.
 fn hash_by(evolver: &Evolver, choice: &[&str]) -> String {
     let status = ["suite", "own.toml", "status", "--out", "suite"];
     let status = evolver.run(&[&status[..], choice].concat());
@@ -71,7 +71,7 @@ fn expected() -> String {
     evolver.text("suite/hashes.txt")
 }
 
-/// Returns the hashes of a suite that was run in shards, in the order of the whole suite.
+/// Returns the hashes of a suite that was run in shards, ordered as in the whole suite.
 fn hashes_after(evolver: &Evolver) -> String {
     let run = evolver.run(&RUN);
     assert_eq!(run.code, Some(0), "{run:?}");
@@ -94,7 +94,8 @@ fn kills_at_random_moments_change_no_hash() {
     let whole = with_the_suite();
     let started = Instant::now();
     assert_eq!(whole.run(&RUN).code, Some(0));
-    // Even on a busy machine, a process makes progress before it is killed.
+    // The delay before a kill is up to the duration of the whole suite, so processes make progress
+    // even on a busy machine.
     let longest = started.elapsed().as_micros() as u32;
     let expected = whole.text("suite/hashes.txt");
     let (mut kills, mut suites) = (0, 0);
@@ -216,7 +217,7 @@ fn a_task_succeeds_only_when_its_shard_is_done() {
     }
 }
 
-/// Creates a folder with programs named like Slurm's, which record their arguments and print what
+/// Creates a folder with programs named like Slurm's; they record their arguments and print what
 /// Slurm would print.
 fn fake_slurm(evolver: &Evolver, sbatch: &str) -> String {
     let programs = [
@@ -313,8 +314,9 @@ fn two_processes_share_the_work() {
     assert_eq!(hashes_after(&evolver), expected());
 }
 
-/// Reads all files of the runs except `meta.json` and `time.json`, which hold the command and the
-/// duration, and the leftovers of processes killed before a run had its final name.
+/// Reads all files of the runs. Leaves out `meta.json` and `time.json`, which contain the command
+/// and the duration, and the leftovers of processes that were killed before a run had its final
+/// name.
 fn contents(evolver: &Evolver) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();
     files
@@ -336,7 +338,8 @@ fn processes_without_locks_leave_the_files_of_one() {
         let runs = evolver.folder().join("suite/runs");
         ended.store(false, Ordering::Relaxed);
         std::thread::scope(|scope| {
-            // As on a file system without locks, where no process sees the locks of others.
+            // This simulates a file system without locks, where no process sees the locks of
+            // others.
             let remover = scope.spawn(|| {
                 let mut removed = 0;
                 while !ended.load(Ordering::Relaxed) {
@@ -369,7 +372,7 @@ fn plan_and_status_count_the_runs() {
     let evolver = with_the_suite();
     let plan = evolver.run(&["suite", "own.toml", "plan"]);
     assert!(plan.stdout.contains("6 different runs"), "{plan:?}");
-    // 6 runs of 20 robots, 6 genomes, 25 generations, 2 repetitions, 40 steps.
+    // 6 runs of 20 robots, 6 genomes, 25 generations, 2 repetitions and 40 steps.
     assert!(plan.stdout.contains("1.4 million robot-steps"), "{plan:?}");
     let none = evolver.run(&["suite", "own.toml", "status", "--out", "suite"]);
     assert_eq!(none.stdout.matches("0 of 3 done").count(), 2, "{none:?}");
@@ -588,7 +591,7 @@ fn a_report_is_written_where_requested_and_replaces_only_a_report() {
     assert_eq!(report("said").code, Some(0));
 
     let (ours, kept) = (evolver.read("results/report.html"), b"dear");
-    // A report's page alone does not identify a directory as a report.
+    // A report's page alone does not mark a directory as a report.
     fs::create_dir(evolver.folder().join("saved")).unwrap();
     evolver.write("saved/report.html", &ours);
     evolver.write("saved/mother.txt", kept);
@@ -683,7 +686,8 @@ fn all_damaged_runs_are_named_and_the_others_are_done_shown_and_reported() {
         .lines()
         .map(|line| format!("suite/runs/{}", &line[..16]))
         .collect();
-    // Truncated, changed, replaced by a directory, missing; and one run not done.
+    // One file each is truncated, changed, replaced by a directory and missing; one run is not
+    // done.
     let state = evolver.text(&format!("{}/final.json", runs[0]));
     evolver.write(&format!("{}/final.json", runs[0]), &state.as_bytes()[..300]);
     evolver.write(&format!("{}/DONE", runs[1]), b"zzz\n");
@@ -820,7 +824,7 @@ fn after_tasks_the_command_that_searches_for_a_structure_is_printed() {
     assert!(!again.contains(command), "{again}");
 }
 
-/// Returns the valid keys listed by the error for an unknown key.
+/// Returns the valid keys that the error for an unknown key lists.
 fn keys_said_with(suite: &str) -> Vec<String> {
     let error = Suite::parse(Path::new("own.toml"), suite).unwrap_err();
     let text = error.to_string();

@@ -1,4 +1,4 @@
-//! Text from users: programs that read its encodings decode it correctly.
+//! Text from users: every encoded text is decoded correctly by the programs that read it.
 
 use minimal_surprise_evolution::text::{
     self, FILE_NAME_BYTES_MAX, TextError, decode, file_name, file_name_except, html, is_hidden,
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tests::full::all_cases;
 
-/// Texts that have caused errors or could cause errors.
+/// Texts that have caused or could cause errors.
 const HARD: [&str; 32] = [
     "",
     " ",
@@ -71,7 +71,7 @@ fn any_text() -> impl Strategy<Value = String> {
     prop_oneof![special, "\\PC{0,12}", any::<String>(), "[a-b.-]{0,5}"]
 }
 
-/// Generates arguments, which have no zero bytes.
+/// Generates program arguments, which contain no zero bytes.
 fn any_bytes() -> impl Strategy<Value = Vec<u8>> {
     let some = prop::collection::vec(1..=255_u8, 0..12);
     prop_oneof![
@@ -326,7 +326,7 @@ fn a_text_file_is_read_in_the_forms_that_programs_save() {
         assert_eq!(decode(bytes), Err(TextError::NotUtf8 { line, byte }));
     }
     proptest!(config(300), |(text in any_text())| {
-        // Text that begins with zeros would be read as UTF-16.
+        // Text that begins with zero bytes would be read as UTF-16.
         prop_assume!(!text.contains('\0'));
         let text = text.replace(['\r', '\u{feff}'], "");
         let windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));

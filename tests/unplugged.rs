@@ -1,8 +1,8 @@
-//! The robot is unplugged during `evolver flash`: QEMU is killed, at chosen flash operations and at
+//! The robot is unplugged during `evolver flash`: QEMU is killed at chosen flash operations and at
 //! random moments. `TEST_ALL=1` kills QEMU more often.
 //!
-//! A failure prints the number of the kill; kills depend only on [`SEED`] and their number, except
-//! for variations of the host's clock.
+//! A failing test prints the number of the kill. A kill depends only on [`SEED`] and its number,
+//! except for variations in timing on the host.
 
 use minimal_surprise_controller::codec::{CONTAINER_BYTES_MAX, Provenance, encode};
 use minimal_surprise_controller::{
@@ -28,7 +28,7 @@ const SEED: u64 = 11;
 /// Number of kills, normally and with `TEST_ALL=1`.
 const KILLS: u32 = 40;
 const KILLS_ALL: u32 = 200;
-/// Number of bytes per erase unit of the robot, and per step of an erase.
+/// Number of bytes per erase unit of the robot's flash, and per step of an erase.
 const ERASE_BYTES: usize = 4096;
 const ERASE_STEP_BYTES: usize = 512;
 /// Number of bytes per word of the robot's flash.
@@ -37,10 +37,10 @@ type Word = [u8; WORD_BYTES];
 const ERASED: Word = [0xff; WORD_BYTES];
 /// Offset of the write count in a slot's header.
 const WRITE_COUNT_AT: usize = 4;
-/// Maximum wait for a flash operation.
+/// Maximum time to wait for a flash operation.
 const OPERATION_WAIT: Duration = Duration::from_secs(20);
 
-/// Time of a kill.
+/// The moment at which QEMU is killed.
 #[derive(Clone, Copy, Debug)]
 enum Kill {
     /// As soon as this step of the slot's erase is done.
@@ -51,7 +51,7 @@ enum Kill {
     After { thousandths: u32 },
 }
 
-/// The bytes of the slot being written, within the flash file.
+/// The bytes in the flash file that belong to the slot being written.
 struct SlotBytes {
     flash: File,
     start: u64,
@@ -82,8 +82,8 @@ impl SlotBytes {
         self.word(at) != self.before[at..at + WORD_BYTES]
     }
 
-    /// Returns the last word erased by a step; for the step at the slot's start, the write count,
-    /// because every header begins with the same word.
+    /// Returns the offset of the last word erased by a step; for the step at the slot's start, the
+    /// offset of the write count, because every header begins with the same word.
     fn last_word(&self, step: usize) -> usize {
         let from = step * ERASE_STEP_BYTES;
         let mut words = (from..from + ERASE_STEP_BYTES).step_by(WORD_BYTES);
@@ -94,9 +94,9 @@ impl SlotBytes {
 }
 
 impl Kill {
-    /// Chooses a kill. Every second kill is at a flash operation. These kills are spread evenly
-    /// over an update: the steps of the erase, the words of the header, the container and the
-    /// commit record.
+    /// Chooses the moment of a kill. Every second kill is at a flash operation. These kills are
+    /// spread evenly over an update: over the steps of the erase and the words of the header, the
+    /// container and the commit record.
     fn choose(index: u32, kills: u32, container_bytes: usize) -> Self {
         if index % 2 == 1 {
             let mut rng = ChaCha8Rng::seed_from_u64(SEED + u64::from(index));
@@ -109,13 +109,13 @@ impl Kill {
                 .step_by(WORD_BYTES)
                 .map(|at| Self::Written { at })
         };
-        // Beyond the container, an erase changes no bytes.
+        // After the end of the container, an erase changes no bytes.
         let steps = (CONTAINER_AT as usize + container_bytes).div_ceil(ERASE_STEP_BYTES);
         let operations: Vec<Self> = (0..steps)
             .map(|step| Self::Erased { step })
             .chain(words(0, 16))
-            // Only a sample: all words are equally critical, and the container has far more of them
-            // than the other parts.
+            // Only a sample of the container's words: all words are equally critical, and the
+            // container has far more words than the other parts.
             .chain(words(CONTAINER_AT, container_bytes).step_by(16))
             .chain(words(COMMIT_AT, 8))
             .collect();
@@ -163,8 +163,8 @@ impl Drop for Failing {
 /// Returns the genome container of one generation, of any topology.
 fn container(generation: u32) -> Vec<u8> {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED + u64::from(generation));
-    // A network that predicts everything has the longest container, over which the kills are
-    // spread.
+    // A network that predicts everything has the longest container; the kills are spread over its
+    // length.
     let topology = match generation % 2 {
         0 => Topology::default(),
         _ => Topology::ALL[generation as usize / 2 % Topology::ALL.len()],
@@ -193,7 +193,7 @@ impl Robot {
         Ok(Self { qemu, genome })
     }
 
-    /// Asserts that the robot decides as with this genome.
+    /// Asserts that the robot makes the decisions of this genome.
     fn must_run(&self, container: &[u8], running: bool, rng: &mut ChaCha8Rng) {
         let (mut line, in_use) = identify(&self.qemu, rng, running);
         assert!(is_in_use(in_use, container), "{in_use:?}");
@@ -248,7 +248,7 @@ fn flash(evolver: &Evolver, port: &str, container: &[u8]) -> Finished {
     evolver.run(&["flash", "new.genome", "--port", port])
 }
 
-/// Returns the offset in the file of the slot that the robot writes next.
+/// Returns the offset, in the file, of the slot that the robot writes next.
 fn slot_to_write(genome: GenomeInUse) -> u64 {
     match genome {
         GenomeInUse::Slot { slot: 0, .. } => slot_bytes(ERASE_BYTES) as u64,
@@ -281,7 +281,7 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
     };
     assert_eq!(robot.genome, GenomeInUse::BuiltIn);
     let mut old = container(0);
-    // Both slots are used before the first kill, so that every update erases a slot.
+    // Both slots are used before the first kill, so every update erases a slot.
     robot.update(&evolver, &container(u32::MAX));
     let mut update_time = robot.update(&evolver, &old);
     let mut slot = slot_bytes(ERASE_BYTES) as u64;
@@ -312,7 +312,7 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
             Some(0) => assert!(runs_new, "the acknowledged genome is lost"),
             Some(code @ (1 | 2)) => {
                 assert_eq!(said(&flashed), 1, "one clear message: {flashed:?}");
-                // Bad input only if the port disappeared before it was opened.
+                // Exit code 2 is correct only if the port disappeared before it was opened.
                 let no_port = flashed.stderr.contains("no such port");
                 assert_eq!(code == 2, no_port, "{flashed:?}");
                 unheard += u32::from(runs_new);
@@ -335,6 +335,6 @@ fn a_robot_killed_while_a_genome_is_written_runs_the_old_one_or_the_new_one() {
          {unheard} of these unacknowledged; seed {SEED}",
         started.elapsed()
     );
-    // Otherwise, the kills would miss the update.
+    // Otherwise, the kills would have missed the update.
     assert!(olds > kills / 2 && news > 0, "{olds} {news}");
 }

@@ -1,8 +1,9 @@
-//! Tests every reader of external bytes with the corpus in `fuzz-corpus` and with mutants of it.
+//! Tests every reader of external bytes with the corpus in `fuzz-corpus` and with mutants of the
+//! corpus.
 //!
-//! The corpus has one folder per target, with seeds and, as `found-…`, every input on which a
-//! reader has failed. `UPDATE_CORPUS=1` rewrites the seeds. `scripts/fuzz.sh` runs the same targets
-//! with coverage guidance.
+//! The corpus has one folder per target. It contains seeds and, as `found-…`, every input on which
+//! a reader has failed. `UPDATE_CORPUS=1` rewrites the seeds. `scripts/fuzz.sh` runs the same
+//! targets with coverage guidance.
 
 mod mutation;
 mod seeds;
@@ -17,14 +18,14 @@ use targets::{TARGETS, Target, check, tests_folder};
 
 /// Time for which a target is tested with mutants. No result depends on the number of mutants.
 const TIME: Duration = Duration::from_secs(5);
-/// Series of the mutants: the same series gives the same mutants on every machine.
+/// Number of the series of mutants: the same series contains the same mutants on every machine.
 const SERIES: u64 = 1;
 
 fn corpus(name: &str) -> PathBuf {
     tests_folder().join("fuzz-corpus").join(name)
 }
 
-/// Returns the inputs of a target's corpus, ordered by name.
+/// Reads the inputs in a target's corpus, ordered by name.
 fn inputs(name: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let files = fs::read_dir(corpus(name)).unwrap_or_else(|_| panic!("{name} has no corpus"));
     let mut paths: Vec<PathBuf> = files.map(|file| file.unwrap().path()).collect();
@@ -33,7 +34,7 @@ fn inputs(name: &str) -> Vec<(PathBuf, Vec<u8>)> {
     paths.into_iter().map(read).collect()
 }
 
-/// Runs a target. If it fails, its input is saved, to be committed with the fix.
+/// Runs a target. If the target fails, saves the input, which should be committed with the fix.
 fn run(target: Target, bytes: &[u8], origin: &str) -> bool {
     catch_unwind(|| check(target, bytes)).unwrap_or_else(|_| {
         let name = format!("found-{:08x}", CRC_32C.checksum(bytes));

@@ -6,7 +6,7 @@ use rand_core::{Rng, SeedableRng};
 /// Maximum size of an input, in bytes.
 const BYTES_MAX: usize = 1 << 16;
 
-/// Tokens that often make readers fail.
+/// Tokens that often cause readers to fail.
 const TOKENS: [&[u8]; 24] = [
     b"0",
     b"-1",

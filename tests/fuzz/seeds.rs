@@ -1,4 +1,4 @@
-//! Seeds of the corpus: small files as written by this program and the authors' program.
+//! Seeds of the corpus: small files of the kinds that this program and the authors' program write.
 
 use super::targets::{CHECKPOINT_SETTINGS, SESSION, tests_folder};
 use minimal_surprise_controller::codec::{self, CONTAINER_BYTES_MAX, Provenance};
@@ -133,7 +133,8 @@ fn experiment() -> Experiment {
     Experiment::new(Settings::resolve(&given, || 0).unwrap())
 }
 
-/// Returns the text before the second generation, which begins with a blank line or a header.
+/// Returns the text before the second generation; that generation begins with a blank line or a
+/// header.
 fn first_generation(text: &str) -> String {
     let end = text.find("\n\n").map_or(text.len(), |end| end + 2);
     text[..end].to_owned()
@@ -143,7 +144,7 @@ fn message(payload: &[u8]) -> Vec<u8> {
     [&[payload.len() as u8], payload].concat()
 }
 
-/// Returns the requests of an update and some steps, and the robot's replies.
+/// Returns the requests for an update and some steps, and the robot's replies.
 fn conversation(container: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let (mut requests, mut replies) = (Vec::new(), Vec::new());
     let mut robot = LinkRobot::start(MockFlash::new());

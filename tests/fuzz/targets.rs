@@ -1,8 +1,9 @@
 //! Every reader of external bytes, as a function of arbitrary bytes.
 //!
-//! A target panics if a property does not hold: the reader accepts or rejects any bytes; accepted
-//! values are within their ranges and, written again, are read unchanged. If a checksum would cause
-//! nearly all bytes to be rejected, the target also tests them with a correct checksum.
+//! A target panics if one of these properties does not hold: the reader accepts or rejects any
+//! bytes without failing; accepted values are within their ranges; values that are written and read
+//! again are unchanged. If a reader checks a checksum, which nearly all bytes would fail, the
+//! target also tests the bytes with a correct checksum.
 
 use firmware_example::range_bearing::RangeBearing;
 use minimal_surprise_controller::codec::{self, CRC_32C, CRC_BYTES, PREFIX_BYTES};
@@ -56,7 +57,7 @@ pub(crate) const TARGETS: [Target; 20] = [
     ("slots", slots),
 ];
 
-/// Maximum memory that a reader may use at once: a constant, plus an amount per byte of input.
+/// Maximum memory that a reader may use at once: a constant plus an amount per byte of input.
 const MEMORY: (u64, u64) = (2 << 20, 500);
 /// Maximum memory that a reader may allocate in total, as a measure of its work.
 const WORK: (u64, u64) = (8 << 20, 20_000);
@@ -121,7 +122,7 @@ pub(crate) const CHECKPOINT_SETTINGS: &str = "grid = \"5x5\"\nrobots = 4\nsensor
 thread_local! {
     static SETTINGS: Settings =
         read_settings(CHECKPOINT_SETTINGS.as_bytes()).expect("they are settings");
-    /// A complete run, one file of which is replaced.
+    /// A complete run in which one file is replaced.
     static RUN: TempDir = copy_of_run();
     /// Folder of the file for readers that take a path.
     static FOLDER: TempDir = tempfile::tempdir().unwrap();
@@ -148,7 +149,7 @@ fn checkpoint(bytes: &[u8]) -> bool {
     accepted
 }
 
-/// Returns the folder of the files that targets start from.
+/// Returns the folder of the files that the targets use.
 pub(crate) fn tests_folder() -> PathBuf {
     // The path must be the same in this package and in the package for coverage-guided fuzzing.
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -174,7 +175,7 @@ fn run_file(name: &str, bytes: &[u8]) -> bool {
             assert!(error.to_string().contains("/"), "no path in {error}");
         }
         if let Ok(finished) = &read {
-            // Checking repeats all steps, so it is done only for files that can make it fail.
+            // The check repeats all steps, so only files that can make it fail are checked.
             if ["best.genome", "final.json"].contains(&name) {
                 let _ = FinishedRun::read_and_check(run.path());
             }
@@ -293,7 +294,8 @@ fn drawing(bytes: &[u8]) -> bool {
     true
 }
 
-/// Splits bytes into messages: one byte with the length of each, then its bytes.
+/// Splits bytes into messages; each consists of one byte with the message's length, followed by the
+/// message.
 fn messages(mut bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     core::iter::from_fn(move || {
         let (&length, rest) = bytes.split_first()?;
@@ -361,7 +363,7 @@ fn link_robot(bytes: &[u8]) -> bool {
     accepted
 }
 
-/// Session of the replies in the corpus.
+/// Session ID in the replies in the corpus.
 pub(crate) const SESSION: u32 = 7;
 
 fn link_host(bytes: &[u8]) -> bool {

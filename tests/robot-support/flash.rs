@@ -1,4 +1,4 @@
-//! A flash chip in memory that loses power on request and panics on misuse.
+//! A simulated flash chip that loses power on request and panics if it is misused.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
@@ -7,15 +7,16 @@ use minimal_surprise_slots::{MappedFlash, SLOT_BYTES_MIN, slot_bytes};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// A chip with words of `W` bytes, which it reads and writes whole, and erase units of `E` bytes.
+/// A chip with erase units of `E` bytes and words of `W` bytes, which are always read and written
+/// as a whole.
 ///
-/// Misuse panics: unaligned operations, a word written twice between two completed erases, an
-/// address out of bounds. If erase units are larger than a slot, only the bytes that a slot needs
-/// are stored, and only these may be used.
+/// The chip panics if it is misused: by unaligned operations, by writing a word twice between two
+/// completed erases, or by an address out of bounds. If erase units are larger than a slot, only
+/// the bytes that a slot needs are stored, and only these may be used.
 #[derive(Clone, Debug)]
 pub struct MockFlash<const W: usize, const E: usize> {
     bytes: Vec<u8>,
-    /// For each word, true if it may be written.
+    /// For each word, true if the word may be written.
     erased: Vec<bool>,
     units: usize,
     cut: Option<Cut>,
@@ -27,7 +28,7 @@ pub struct MockFlash<const W: usize, const E: usize> {
 /// Counts of a flash's operations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Number of moments at which power could have failed.
+    /// Number of moments at which the power could have failed.
     pub moments: u64,
     /// Number of writes.
     pub writes: u64,
@@ -37,7 +38,7 @@ pub struct Counts {
     pub erases: u64,
 }
 
-/// A power cut in the future.
+/// A future power cut.
 #[derive(Clone, Copy, Debug)]
 struct Cut {
     at_moment: u64,
@@ -54,7 +55,7 @@ impl NorFlashError for PowerCut {
     }
 }
 
-/// Results of an interrupted erase, in the order of its moments.
+/// Possible results of an interrupted erase, in order of time.
 const TORN_ERASES: [TornErase; 5] = [
     TornErase::Untouched,
     TornErase::HalfErased,
@@ -97,7 +98,7 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         }
     }
 
-    /// Like [`Self::new`], with these bytes in the first slot.
+    /// Creates a chip like [`Self::new`], but with these bytes in the first slot.
     ///
     /// # Panics
     /// If `slot` is longer than a slot.
@@ -110,7 +111,7 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         flash
     }
 
-    /// Makes power fail after this many more moments; `seed` determines the remaining contents.
+    /// Cuts the power after this many more moments; `seed` determines which contents remain.
     pub fn cut_power_after(&mut self, moments: u64, seed: u64) {
         self.cut = Some(Cut {
             at_moment: self.counts.moments + moments,
@@ -130,7 +131,7 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         self.bytes[place] ^= mask;
     }
 
-    /// Returns the index of `length` bytes at an address within the stored bytes.
+    /// Returns the index, within the stored bytes, of `length` bytes at an address.
     fn place(at: u32, length: usize) -> usize {
         let at = at as usize;
         let (unit, within) = (at / E, at % E);
@@ -145,7 +146,8 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         unit * kept + within
     }
 
-    /// Checks whether power fails at this moment; returns the generator for the remaining contents.
+    /// Checks whether the power fails at this moment; if so, returns the generator of the remaining
+    /// contents.
     fn fails_now(&mut self) -> Option<ChaCha8Rng> {
         let moment = self.counts.moments;
         self.counts.moments += 1;
@@ -180,8 +182,8 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         Ok(())
     }
 
-    /// Simulates a write interrupted at byte `whole` of a word: the bytes before it are written,
-    /// the others have some of their bits written, or any value.
+    /// Simulates a write interrupted at byte `whole` of a word: the bytes before it are written;
+    /// the others have only some of their bits written, or contain arbitrary values.
     fn tear_word(word: &mut [u8], wanted: &[u8], whole: usize, rng: &mut ChaCha8Rng) {
         let anything = rng.next_u32() & 1 == 0;
         for (index, (byte, &wanted)) in word.iter_mut().zip(wanted).enumerate() {
@@ -264,7 +266,7 @@ impl<const W: usize, const E: usize> NorFlash for MockFlash<W, E> {
             self.bytes[place..place + W].copy_from_slice(wanted);
             self.counts.written_bytes += W as u64;
         }
-        // The write has finished, but may remain unreported.
+        // The write has finished, but power may fail before its success is reported.
         self.fails_now().map_or(Ok(()), |_| Err(PowerCut))
     }
 }

@@ -1,4 +1,4 @@
-//! A robot without wheels on a serial line: slots in a mock flash and a controller.
+//! A robot without wheels on a serial line; it consists of slots in a mock flash and a controller.
 
 use crate::flash::MockFlash;
 use firmware_example::robot::{genome_in_use, refusal};
@@ -22,13 +22,15 @@ pub struct LinkRobot {
     report: Report,
     /// Kernel that the robot reports.
     pub kernel: KernelId,
-    /// The step, counted from 0 since the last reset, in which the controller makes an error.
+    /// The step in which the controller makes an error, counted from 0 since the last reset.
     pub errs_in_step: Option<u32>,
-    /// The genome that the robot reports as in use, if wrong on purpose.
+    /// A deliberately wrong genome that the robot reports as in use, if any.
     pub claims_genome: Option<GenomeInUse>,
-    /// The report that the robot returns, if wrong on purpose; its steps return the same surprise.
+    /// A deliberately wrong report that the robot returns, if any; the robot's steps return the
+    /// same surprise.
     pub claims_report: Option<Report>,
-    /// The request that the robot rejects, by its number among the executed ones, and the refusal.
+    /// The number of the request that the robot rejects, counted among executed requests, and the
+    /// refusal.
     pub refuses: Option<(u64, Refusal)>,
     /// Number of executed requests, excluding identification and telemetry.
     pub done: u64,
@@ -38,7 +40,7 @@ impl LinkRobot {
     /// Starts the robot.
     ///
     /// # Panics
-    /// If the flash has no room for slots.
+    /// If the flash is too small for the slots.
     #[must_use]
     pub fn start(flash: Flash) -> Self {
         let mut room = Buffer::new();

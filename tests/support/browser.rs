@@ -1,5 +1,5 @@
-//! Headless Chromium, controlled through its DevTools protocol: JSON with a zero byte after each
-//! message, over pipes, so that no port is opened.
+//! Headless Chromium, controlled through its DevTools protocol: JSON messages, each followed by a
+//! zero byte, over pipes, so that no port is opened.
 
 use crate::tools::Missing;
 use serde_json::{Value, json};
@@ -21,7 +21,7 @@ pub struct Browser {
     messages: Receiver<Value>,
     last_id: u64,
     session: Option<String>,
-    /// Events sent by the page since the browser was started.
+    /// Events that pages have sent since the browser was started.
     events: Vec<Value>,
     _profile: TempDir,
 }
@@ -64,7 +64,7 @@ impl Browser {
                 "--disable-component-update",
                 "--no-first-run",
                 "--window-size=1280,900",
-                // No network, even if a page requests one.
+                // No network access, even if a page requests it.
                 "--proxy-server=http://127.0.0.1:9",
                 "--host-resolver-rules=MAP * ~NOTFOUND",
                 "--remote-debugging-pipe",
@@ -117,7 +117,7 @@ impl Browser {
     /// Sends a command and waits for its result.
     ///
     /// # Panics
-    /// If the result is missing or an error.
+    /// If no result arrives or the result is an error.
     pub fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.last_id += 1;
         let id = self.last_id;
@@ -160,8 +160,8 @@ impl Browser {
         self.wait_for(&loaded);
     }
 
-    /// Evaluates an expression on the page; if the value is a promise, returns the value it
-    /// resolves to.
+    /// Evaluates an expression on the page; if the expression returns a promise, returns the value
+    /// to which the promise resolves.
     ///
     /// # Panics
     /// If the expression throws, or its value has a different type.
@@ -195,7 +195,7 @@ impl Browser {
         self.press_with(key, 0);
     }
 
-    /// Like [`Browser::press`], with Shift held.
+    /// Presses a key like [`Browser::press`], but with Shift held.
     pub fn press_shifted(&mut self, key: &str) {
         self.press_with(key, 8);
     }
@@ -246,13 +246,13 @@ impl Browser {
         self.call("Emulation.setDeviceMetricsOverride", size);
     }
 
-    /// Checks that no page has reported an error so far, and that none has requested anything
+    /// Checks that no page has reported an error so far, and that no page has requested anything
     /// except files and data in the page.
     ///
     /// # Panics
     /// If a page has reported an error or requested anything else.
     pub fn assert_quiet(&mut self) {
-        // All earlier events arrive before this reply.
+        // All earlier events arrive before the reply to this command.
         let _: bool = self.evaluate("true");
         for event in &self.events {
             let details = &event["params"];
@@ -285,8 +285,8 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // When asked to close, Chromium waits for its other processes, so that none is writing to
-        // the profile when it is removed.
+        // On a request to close, Chromium waits for its other processes, so no process is still
+        // writing to the profile when the profile is removed.
         let _ = self
             .requests
             .write_all(b"{\"id\":0,\"method\":\"Browser.close\"}\0");

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A mounted file system or file; unmounted on drop.
+/// A mounted file system or file, which is unmounted on drop.
 #[derive(Debug)]
 pub struct Disk(PathBuf);
 
@@ -24,7 +24,7 @@ impl Disk {
         Self::mounted(path, &options)
     }
 
-    /// Mounts a file over another one.
+    /// Mounts a file over another file.
     ///
     /// # Errors
     /// [`Missing`] if this process is not privileged.
@@ -44,7 +44,7 @@ impl Disk {
         }
     }
 
-    /// Remounts the file system with a different option.
+    /// Remounts the file system with this option.
     ///
     /// # Panics
     /// If the file system cannot be remounted.

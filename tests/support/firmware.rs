@@ -9,10 +9,10 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use std::{fs, thread};
 
-/// Exit code of `scripts/thumb-cargo.sh` if no compiler is found.
+/// Exit code of `scripts/thumb-cargo.sh` if it finds no compiler.
 const NO_COMPILER: i32 = 69;
 
-/// Maximum run time of a program, because a program that has crashed may never exit.
+/// Maximum run time of a program; needed because a program that has crashed may never exit.
 const TIMEOUT: Duration = Duration::from_secs(300);
 
 const TARGET: &str = "thumbv7em-none-eabihf";
@@ -25,7 +25,7 @@ const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 \
     -nographic -monitor none -serial none \
     -semihosting-config enable=on,target=native -kernel";
 
-/// QEMU's STM32F405, which emulates neither clock, timers nor pins, but traces writes to their
+/// QEMU's STM32F405. QEMU does not emulate the clocks, timers or pins, but traces writes to their
 /// registers.
 const QEMU_STM32F4_ARGUMENTS: &str = "-machine netduinoplus2 \
     -nographic -monitor none -serial none -d unimp,int -D";
@@ -33,7 +33,7 @@ const QEMU_STM32F4_ARGUMENTS: &str = "-machine netduinoplus2 \
 /// The built programs of `firmware-example`.
 pub struct Firmware {
     programs: PathBuf,
-    /// The compiler used.
+    /// The compiler that built them.
     pub compiler: String,
 }
 
@@ -81,13 +81,13 @@ pub fn link(package: &str, program: &str) -> Result<Linked, Missing> {
     cargo_build(&["--package", package, "--bin", program])
 }
 
-/// Returns the bytes of flash used by a linked program: its loaded sections.
+/// Returns the number of flash bytes that a linked program uses: the size of its loaded sections.
 ///
 /// # Panics
 /// If the program was not linked.
 #[must_use]
 pub fn flash_bytes(program: &str) -> u32 {
-    /// Type of a section with contents, and flag of a section in memory.
+    /// Type of a section that has contents, and flag of a section that is loaded into memory.
     const PROGBITS: u32 = 1;
     const ALLOC: u32 = 2;
     let elf = fs::read(programs().join(program)).expect("a linked program");
@@ -163,13 +163,13 @@ impl Firmware {
         self.programs.join(program)
     }
 
-    /// Runs a program to completion and returns the lines it logged.
+    /// Runs a program to completion and returns the lines that it logged.
     ///
     /// # Errors
     /// [`Missing`] if QEMU is not installed.
     ///
     /// # Panics
-    /// If the program fails or does not end in time.
+    /// If the program fails or does not exit in time.
     pub fn run(&self, program: &str) -> Result<Vec<String>, Missing> {
         let mut lines = Vec::new();
         let status = run(&self.elf(program), |line| lines.push(line))?;
@@ -185,7 +185,7 @@ impl Firmware {
 const MPS2_WHEELS: &str = "mps2_fpgaio_write";
 const STM32F4_WHEELS: &str = "GPIOC: unimplemented device write";
 
-/// A program's writes to the wheels before and during a fault, as traced by QEMU.
+/// A program's writes to the wheels' registers before and during a fault, as traced by QEMU.
 #[derive(Debug)]
 pub struct Faulted {
     /// Writes to the wheels' registers, one line each.
@@ -218,7 +218,7 @@ pub fn fault_on_mps2(elf: &Path, fault: &str, trace: &Path) -> Result<Faulted, M
 }
 
 /// Runs the `faults-stm32f4` program, which triggers this fault, until it has written to the
-/// wheels' registers three times: to turn the wheels, and twice to stop them.
+/// wheels' registers three times: once to turn the wheels and twice to stop them.
 ///
 /// # Errors
 /// [`Missing`] if QEMU is not installed.
@@ -261,12 +261,12 @@ fn lines(path: &Path, start: &str) -> Vec<String> {
     lines.map(str::to_owned).collect()
 }
 
-/// Runs the program in an ELF file under QEMU and passes each line of its log to `line`. Returns
-/// its exit status.
+/// Runs the program in an ELF file under QEMU and passes each line of the program's log to `line`.
+/// Returns the exit status.
 ///
 /// # Errors
-/// [`Missing`] if QEMU is not installed; the inner error reports that the file or its log cannot be
-/// read, or that QEMU cannot be run.
+/// [`Missing`] if QEMU is not installed. The inner error if the file or the log cannot be read or
+/// QEMU cannot be run.
 pub fn run(elf: &Path, line: impl FnMut(String)) -> Result<io::Result<ExitStatus>, Missing> {
     run_with(QEMU_ARGUMENTS, elf, line)
 }
@@ -286,7 +286,7 @@ fn run_with(
         Ok(mut child) => {
             let result = follow(elf, &mut child, line);
             if result.is_err() {
-                // QEMU may already have exited; this is ignored.
+                // QEMU may already have exited; the error is then ignored.
                 let _ = child.kill();
                 let _ = child.wait();
             }

@@ -8,7 +8,7 @@ use rand_core::SeedableRng;
 /// Returns the container of a genome with random weights.
 ///
 /// # Panics
-/// Never: the buffer holds any container.
+/// Never: the buffer is large enough for any container.
 #[must_use]
 pub fn random(seed: u64, topology: Topology) -> Vec<u8> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -19,7 +19,7 @@ pub fn random(seed: u64, topology: Topology) -> Vec<u8> {
         .to_vec()
 }
 
-/// Returns the container changed to name a different kernel.
+/// Returns a copy of the container that names a different kernel.
 ///
 /// # Panics
 /// If the bytes are not a container.

@@ -27,7 +27,7 @@ struct Header {
     prediction_output: Vec<i16>,
 }
 
-/// One recorded step as stored in the file.
+/// A recorded step, as stored in the file.
 #[derive(Deserialize)]
 struct StepLine {
     t: u32,
@@ -70,7 +70,7 @@ pub struct Recording {
     pub steps: u32,
     /// Starting poses.
     pub start: Vec<Pose>,
-    /// The steps; empty for the long files.
+    /// The steps; empty for long recordings.
     pub trace: Vec<Step>,
     /// Recorded fitness.
     pub fitness: f64,
@@ -80,7 +80,7 @@ pub struct Recording {
     pub final_poses: Vec<Pose>,
 }
 
-/// Returns the folder of the recordings: `GOLDEN_DIR`, or the project's own copy.
+/// Returns the folder of the recordings: `GOLDEN_DIR` if set, otherwise the project's own copy.
 #[must_use]
 pub fn directory() -> PathBuf {
     std::env::var_os("GOLDEN_DIR").map_or_else(
@@ -175,7 +175,7 @@ fn topology(header: &Header) -> Topology {
         "predefined" => Prediction::Predefined(template()),
         other => panic!("predictions {other}"),
     };
-    Topology::new(model, prediction).expect("a topology that exists")
+    Topology::new(model, prediction).expect("a known topology")
 }
 
 impl StepLine {

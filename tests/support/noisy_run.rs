@@ -1,4 +1,4 @@
-//! A noisy run of the first version, whose steps hash covers bits without a sensor.
+//! A noisy run of the first version; its steps hash also covers bits that have no sensor.
 
 use std::fs;
 use std::path::Path;

@@ -27,7 +27,7 @@ pub enum Profile {
 pub fn path(profile: Profile) -> PathBuf {
     static DEBUG: OnceLock<PathBuf> = OnceLock::new();
     static RELEASE: OnceLock<PathBuf> = OnceLock::new();
-    /// One build at a time, because builds would wait for each other anyway.
+    /// Start one build at a time, because builds would wait for each other anyway.
     static BUILDING: Mutex<()> = Mutex::new(());
     let built = match profile {
         Profile::Debug => &DEBUG,
@@ -49,7 +49,7 @@ pub fn path(profile: Profile) -> PathBuf {
     built.get_or_init(build).clone()
 }
 
-/// The program in an empty folder that is removed on drop.
+/// The program, with a folder that is empty at first and is removed on drop.
 #[derive(Debug)]
 pub struct Evolver {
     folder: TempDir,
@@ -59,7 +59,7 @@ pub struct Evolver {
 /// A process that has exited.
 #[derive(Debug)]
 pub struct Finished {
-    /// Exit code; `None` after a signal.
+    /// Exit code; `None` if a signal ended the process.
     pub code: Option<i32>,
     /// Standard output.
     pub stdout: String,
@@ -71,7 +71,7 @@ impl Finished {
     /// Checks that the program failed, and that the message contains all these words.
     ///
     /// # Panics
-    /// If the process exited otherwise.
+    /// If the exit code is not 1, or the message lacks one of the words.
     pub fn assert_failed(&self, words: &[&str]) {
         assert_eq!(self.code, Some(1), "{self:?}");
         for word in words {
@@ -133,7 +133,7 @@ impl Evolver {
         command
     }
 
-    /// Like [`Evolver::run`], with an environment variable set.
+    /// Runs the program like [`Evolver::run`], but with an environment variable set.
     ///
     /// # Panics
     /// If `evolver` cannot be started.
@@ -157,7 +157,7 @@ impl Evolver {
     /// If the program cannot be started.
     #[must_use]
     pub fn start(&self, arguments: &[impl AsRef<OsStr>]) -> Running {
-        // Signals end the program even if the tests ignore them, as background jobs do.
+        // Signals end the program even if the tests ignore signals, as background jobs do.
         let mut command = Command::new("env");
         if cfg!(target_os = "linux") {
             command.arg("--default-signal=INT,TERM,HUP");
@@ -282,7 +282,7 @@ impl Running {
     /// # Panics
     /// If the process has exited.
     pub fn signal(&self, signal: &str) {
-        // Uses the shell's builtin, because a minimal system lacks the `kill` program.
+        // Use the shell's builtin, because a minimal system lacks the `kill` program.
         let command = format!("kill -{signal} {}", self.child.id());
         let sent = Command::new("sh").args(["-c", &command]).status();
         assert!(sent.is_ok_and(|status| status.success()), "{command}");

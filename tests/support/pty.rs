@@ -1,4 +1,4 @@
-//! Devices on a simulated serial port: a pseudo-terminal with a thread at the other end.
+//! Devices on a simulated serial port, which is a pseudo-terminal with a thread at the other end.
 
 use crate::link_robot::{Flash, LinkRobot};
 use minimal_surprise_link::Server;
@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// A device on a serial port. Dropping it unplugs it.
+/// A device on a serial port. It is unplugged on drop.
 #[derive(Debug)]
 pub struct Device {
     /// Name of the port.
@@ -25,9 +25,9 @@ pub struct Device {
 
 /// Reply to received bytes.
 pub enum Answer {
-    /// The bytes of the reply.
+    /// A reply with these bytes.
     Bytes(Vec<u8>),
-    /// Unplugs the line instead of replying.
+    /// Unplugging of the line instead of a reply.
     Unplugged,
 }
 
@@ -57,8 +57,8 @@ impl Device {
         })
     }
 
-    /// Plugs in a device on a board that restarts: after the first byte arrives, the board receives
-    /// nothing for `silence` and sends `noise` repeatedly.
+    /// Plugs in a device on a board that restarts: for the time `silence` after the first byte
+    /// arrives, the board receives nothing and sends `noise` repeatedly.
     ///
     /// # Panics
     /// If no pseudo-terminal can be created.
@@ -78,7 +78,7 @@ impl Device {
         })
     }
 
-    /// Plugs in a device that sends the same bytes repeatedly, whether or not they are read.
+    /// Plugs in a device that repeatedly sends the same bytes, even if they are not read.
     ///
     /// # Panics
     /// If no pseudo-terminal can be created.
@@ -95,7 +95,7 @@ impl Device {
 
     fn with_thread(run: impl FnOnce(PtyMaster, &AtomicBool) + Send + 'static) -> Self {
         // Processes started by other tests must not inherit the ends of the line. Reads must not
-        // block, so that the thread can end.
+        // block, so that the thread can exit.
         let flags = OFlag::O_RDWR | OFlag::O_NOCTTY | OFlag::O_CLOEXEC | OFlag::O_NONBLOCK;
         let master = posix_openpt(flags).expect("a pseudo-terminal");
         let port = name(&master);
@@ -129,7 +129,7 @@ impl Drop for Device {
         self.unplugged.store(true, Ordering::Relaxed);
         self.held = None;
         if let Some(thread) = self.thread.take() {
-            // If the thread has panicked, it has printed its message.
+            // If the thread has panicked, it has already printed its message.
             let _ = thread.join();
         }
     }
@@ -139,7 +139,7 @@ impl Drop for Device {
 #[derive(Debug)]
 pub struct PluggedRobot {
     robot: Arc<Mutex<LinkRobot>>,
-    /// Device on the serial port.
+    /// The robot's device on the serial port.
     pub device: Device,
 }
 
@@ -148,7 +148,7 @@ pub struct PluggedRobot {
 pub enum Fault {
     /// No fault.
     None,
-    /// The line is unplugged when the robot has executed this many requests.
+    /// The line is unplugged once the robot has executed this many requests.
     PulledAfter(u64),
     /// After this many requests, the robot's replies are lost.
     MuteAfter(u64),
@@ -163,8 +163,8 @@ impl PluggedRobot {
         Self::restarting(flash, fault, Duration::ZERO, b"")
     }
 
-    /// Like [`Self::start`], with a board that restarts at the first byte: for `silence`, it sends
-    /// `noise` and receives nothing.
+    /// Starts a robot like [`Self::start`], but on a board that restarts at the first byte: for the
+    /// time `silence`, the board sends `noise` and receives nothing.
     #[must_use]
     pub fn restarting(flash: Flash, fault: Fault, silence: Duration, noise: &'static [u8]) -> Self {
         let robot = Arc::new(Mutex::new(LinkRobot::start(flash)));

@@ -11,11 +11,12 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// The same arguments as in `firmware-example/src/bin/robot.rs`. Time is wall-clock time.
+/// The arguments documented in `firmware-example/src/bin/robot.rs`. QEMU's clock shows wall-clock
+/// time.
 const QEMU_ARGUMENTS: &str = "-cpu cortex-m4 -machine mps2-an386 -nographic -monitor none \
     -serial pty -semihosting-config enable=on,target=native -kernel";
 
-/// A running robot. Dropping it kills it.
+/// A running robot. It is killed on drop.
 #[derive(Debug)]
 pub struct QemuRobot {
     child: Child,
@@ -26,8 +27,8 @@ pub struct QemuRobot {
 }
 
 impl QemuRobot {
-    /// Starts the robot. The flash is `flash.bin` in `folder`, created if missing; the log is
-    /// discarded.
+    /// Starts the robot. Its flash is `flash.bin` in `folder`, which is created if missing; its log
+    /// is discarded.
     ///
     /// # Errors
     /// [`Missing`] if QEMU is not installed.
@@ -58,7 +59,7 @@ impl QemuRobot {
             .find(|word| word.starts_with("/dev"));
         let port = port.unwrap_or_else(|| panic!("no serial port in {line:?}"));
         let port = port.to_owned();
-        // A full pipe would block the robot at the next log line.
+        // If the pipe were full, the next log line would block the robot.
         thread::spawn(move || io::copy(&mut output, &mut io::sink()));
         let open = OpenOptions::new().read(true).write(true).open(&port);
         Ok(Self {
@@ -68,7 +69,7 @@ impl QemuRobot {
         })
     }
 
-    /// Cuts the robot's power: SIGKILL.
+    /// Cuts the robot's power by sending SIGKILL to QEMU.
     ///
     /// # Panics
     /// If QEMU cannot be killed.
@@ -80,7 +81,7 @@ impl QemuRobot {
 
 impl Drop for QemuRobot {
     fn drop(&mut self) {
-        // QEMU may already have exited; this is ignored.
+        // QEMU may already have exited; the error is then ignored.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -135,7 +136,10 @@ impl Line {
         answer: impl FnOnce(Reply<'_>) -> T,
     ) -> Result<T, LineError> {
         let wait = Duration::from_millis(request.timeout_ms().into());
-        let frame = self.client.request(request).expect("a request to send");
+        let frame = self
+            .client
+            .request(request)
+            .expect("the request can be sent");
         self.port.write_all(frame)?;
         let mut overdue = Instant::now() + wait;
         loop {

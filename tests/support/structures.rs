@@ -5,7 +5,7 @@ use minimal_surprise_sim::{Grid, Pose};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// A line of the file.
+/// One line of the file.
 #[derive(Deserialize)]
 struct StateLine {
     grid: (u32, u32),
@@ -65,7 +65,7 @@ pub struct Counts {
     pub clusters: u64,
     /// Number of connected pairs of clusters.
     pub connections: u64,
-    /// The grouping formed by the clusters; clustering if there are no clusters.
+    /// The grouping that the clusters form; clustering if no clusters exist.
     pub verdict: Structure,
 }
 
@@ -93,7 +93,7 @@ impl Counts {
         }
     }
 
-    /// Returns every count and the verdict, in a fixed order, with names.
+    /// Returns the names and values of all counts and of the verdict, in a fixed order.
     #[must_use]
     pub fn named(&self) -> [(&'static str, u64); 12] {
         [
@@ -123,11 +123,11 @@ pub struct State {
     pub grid: Grid,
     /// The swarm.
     pub poses: Vec<Pose>,
-    /// Counts of the authors' scripts.
+    /// Counts computed by the authors' scripts.
     pub recorded: Counts,
 }
 
-/// Returns the file of the states: `STRUCTURES_FILE`, or the project's own copy.
+/// Returns the path of the states: `STRUCTURES_FILE` if set, otherwise the project's own copy.
 #[must_use]
 pub fn file() -> PathBuf {
     std::env::var_os("STRUCTURES_FILE").map_or_else(

@@ -1,4 +1,4 @@
-//! A program in a pseudo-terminal, which receives keys and whose screen is read.
+//! Runs a program in a pseudo-terminal, sends it keys and reads its screen.
 
 use crate::program::Evolver;
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
@@ -8,10 +8,10 @@ use std::process::Command;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Maximum wait for the screen to show something.
+/// Maximum time to wait for contents of the screen.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A program that runs in a terminal. It is killed on drop.
+/// A program that runs in a terminal; it is killed on drop.
 pub struct Terminal {
     child: Box<dyn Child + Send + Sync>,
     master: Box<dyn MasterPty + Send>,
@@ -58,7 +58,8 @@ impl Terminal {
         Self::start_with(evolver, window, variables, arguments)
     }
 
-    /// Like [`Self::start`], with environment variables; a variable without a value is unset.
+    /// Starts the program like [`Self::start`], but with these environment variables; a variable
+    /// without a value is unset.
     ///
     /// # Panics
     /// If the program cannot be started.
@@ -167,7 +168,7 @@ impl Terminal {
         self.wait_until(words, false);
     }
 
-    /// Waits until the condition holds for the screen, whose contents arrive in pieces.
+    /// Waits until the condition holds for the screen; its contents may arrive in pieces.
     ///
     /// # Panics
     /// If the condition does not become true in time.
@@ -217,7 +218,7 @@ impl Terminal {
         self.wait_for(words);
     }
 
-    /// Sends the program a signal.
+    /// Sends a signal to the program.
     ///
     /// # Panics
     /// If the program has exited.

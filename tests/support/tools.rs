@@ -1,4 +1,4 @@
-//! Tools that a test needs and that may be missing on a machine.
+//! Tools that a test needs but that may not be installed.
 
 use std::fmt;
 
@@ -15,8 +15,8 @@ impl fmt::Display for Missing {
 /// Returns the tool, or prints that the test is skipped and returns `None`.
 ///
 /// # Panics
-/// If the tool is missing and the environment has `CI=true`: there, a skipped test would go
-/// unnoticed.
+/// If the tool is missing and the environment has `CI=true`, since a skipped test would go
+/// unnoticed in CI.
 #[must_use]
 pub fn require<T>(tool: Result<T, Missing>) -> Option<T> {
     match tool {
