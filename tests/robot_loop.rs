@@ -162,7 +162,7 @@ fn robot_that_goes_straight() -> TestRobot {
     start(slots.release())
 }
 
-/// Returns a robot without a genome, which turns clockwise.
+/// Returns a robot without a genome; such a robot turns clockwise.
 fn robot_that_turns() -> TestRobot {
     start(MemoryFlash::new())
 }

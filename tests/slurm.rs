@@ -126,11 +126,11 @@ impl Slurm {
             .collect()
     }
 
-    /// Starts requeued tasks, which Slurm would otherwise delay by two minutes.
+    /// Starts requeued tasks; otherwise, Slurm would delay them by two minutes.
     fn hurry(&self, job: &str) {
         for (task, [state, _, reason]) in self.tasks(job) {
             if state == "PENDING" && reason == "BeginTime" {
-                // A node rejects a job if it ended the same job less than a second ago.
+                // A node rejects a job if the node ended the same job less than a second ago.
                 std::thread::sleep(Duration::from_secs(3));
                 let task = format!("jobid={job}_{task}");
                 self.ask(&["scontrol", "update", &task, "StartTime=now"]);
@@ -304,7 +304,7 @@ fn a_node_that_dies_in_a_real_slurm_changes_no_byte() {
     };
     let evolver = with_the_suite();
     let job = slurm.submit(&evolver, "3");
-    // Changes to the suite's file do not affect the tasks, which use copies.
+    // Changes to the suite's file do not affect the tasks, since they use copies.
     evolver.write("own.toml", b"edited");
     until("a task on each node, and each with a run", || {
         let on_nodes = |task: &[String; 3]| task[0] == "RUNNING";

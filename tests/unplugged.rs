@@ -248,7 +248,7 @@ fn flash(evolver: &Evolver, port: &str, container: &[u8]) -> Finished {
     evolver.run(&["flash", "new.genome", "--port", port])
 }
 
-/// Returns the offset, in the file, of the slot that the robot writes next.
+/// Returns the offset within the file of the slot that the robot writes next.
 fn slot_to_write(genome: GenomeInUse) -> u64 {
     match genome {
         GenomeInUse::Slot { slot: 0, .. } => slot_bytes(ERASE_BYTES) as u64,

@@ -70,9 +70,10 @@ enum Command {
     Start(PortArgs),
     /// Stop the robot on a serial port.
     Stop(PortArgs),
-    /// Hardware in the loop: simulate a swarm whose robot 0 is on a serial port, and compare.
+    /// Hardware in the loop: simulate a swarm whose robot 0 is on a serial port, and compare the
+    /// result with a simulation.
     Hil(HilArgs),
-    /// Import genomes from the text files of the program published by the paper's authors.
+    /// Import genomes from text files that the program of the paper's authors has written.
     Import(ImportArgs),
     /// Show the contents of a genome file.
     Inspect {

@@ -123,7 +123,7 @@ impl HilTrial {
 }
 
 impl HilRun {
-    /// Returns the first step, counted from 1, in which robot 0's decisions differ.
+    /// Returns the first step, counted from 1, in which robot 0's decisions in the two runs differ.
     #[must_use]
     pub fn first_difference(&self, there: &Self) -> Option<usize> {
         let pairs = self.decisions.iter().zip(&there.decisions);

@@ -126,8 +126,8 @@ pub(crate) fn lost() -> Option<&'static io::Error> {
     LOST.get()
 }
 
-/// Returns whether the reader of standard output has closed it; on a terminal, any error means
-/// this.
+/// Returns whether the error means that the reader of standard output has closed it; on a terminal,
+/// every error means this.
 pub(crate) fn is_gone(error: &io::Error) -> bool {
     error.kind() == ErrorKind::BrokenPipe || *STDOUT_IS_TERMINAL
 }

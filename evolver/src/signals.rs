@@ -20,7 +20,8 @@ const SIGNALS: [i32; 2] = [consts::SIGINT, consts::SIGTERM];
 /// terminal and one from its shell, count as one.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// True if a stop at the next point from which the work can be resumed was requested.
+/// True once a stop has been requested; work then stops at the next point from which it can be
+/// resumed.
 static STOP: AtomicBool = AtomicBool::new(false);
 
 /// Returns the flag that requests a stop at the next point from which the work can be resumed.
@@ -49,7 +50,7 @@ pub fn wait_until(moment: Instant) {
 /// exits immediately. In both cases the run can be resumed.
 ///
 /// # Errors
-/// If the signal handlers cannot be installed or the thread cannot be started.
+/// If the signal handlers cannot be installed or a thread cannot be started.
 pub fn stop_on_signal() -> io::Result<&'static AtomicBool> {
     ask_then_end("stopping after this generation", || {})?;
     Ok(stop())
@@ -59,7 +60,7 @@ pub fn stop_on_signal() -> io::Result<&'static AtomicBool> {
 /// `last` and exits.
 ///
 /// # Errors
-/// If the signal handlers cannot be installed or the thread cannot be started.
+/// If the signal handlers cannot be installed or a thread cannot be started.
 pub fn ask_then_end(words: &'static str, last: impl Fn() + Send + 'static) -> io::Result<()> {
     let mut asked = false;
     on_signal(move || {
@@ -76,7 +77,7 @@ pub fn ask_then_end(words: &'static str, last: impl Fn() + Send + 'static) -> io
 /// Calls `handle` on a separate thread for every signal that requests an exit.
 ///
 /// # Errors
-/// If the signal handlers cannot be installed or the thread cannot be started.
+/// If the signal handlers cannot be installed or a thread cannot be started.
 pub fn on_signal(mut handle: impl FnMut() + Send + 'static) -> io::Result<()> {
     let came = Arc::new(AtomicBool::new(false));
     let ignored = ignored();

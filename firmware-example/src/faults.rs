@@ -42,8 +42,9 @@ mod mpu {
 /// Start of the 32 KiB below RAM; every function's frame is smaller than that.
 const BELOW_RAM: u32 = 0x1fff_8000;
 
-/// Forbids access to the addresses below RAM, which begins at 0x20000000. Without this, the effect
-/// of writes to unmapped addresses depends on the chip; QEMU's `mps2-an386` ignores them.
+/// Forbids access to the addresses below RAM, which begins at 0x20000000. Without this guard, the
+/// effect of writes to unmapped addresses depends on the chip; QEMU's `mps2-an386` ignores such
+/// writes.
 pub fn guard_stack() {
     // SAFETY: accesses registers of the processor. No variable is in the region.
     unsafe {

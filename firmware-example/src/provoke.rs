@@ -19,7 +19,7 @@ const INTERRUPTS_PENDING: *mut u32 = 0xe000_e200 as *mut u32;
 const UNEXPECTED: u32 = 1 << 20;
 /// An address below RAM, where access is forbidden.
 const BELOW_RAM: *mut u32 = 0x1fff_fff0 as *mut u32;
-/// Address of processor registers, which cannot be executed.
+/// Address of processor registers; execution is not allowed there.
 const NO_PROGRAM: u32 = 0xe000_0001;
 
 /// Triggers the fault named by the second word of the program's command line, with interrupts

@@ -1,6 +1,6 @@
 //! Measurement of the stack that a function uses.
 //!
-//! Uses `unsafe` because it writes to the unused stack, and later checks which words have changed.
+//! Uses `unsafe` to write to the unused stack and to check later which words have changed.
 #![allow(unsafe_code)]
 
 use core::ptr;

@@ -2,7 +2,7 @@
 //!
 //! A target panics if one of these properties does not hold: the reader accepts or rejects any
 //! bytes without failing; accepted values are within their ranges; values that are written and read
-//! again are unchanged. If a reader checks a checksum, which nearly all bytes would fail, the
+//! again are unchanged. If a reader verifies a checksum that nearly all bytes would fail, the
 //! target also tests the bytes with a correct checksum.
 
 use firmware_example::range_bearing::RangeBearing;

@@ -2,7 +2,7 @@
 //!
 //! The program uses the standard library's tanh, and computes input activations once per genome and
 //! hidden activations once per step. It runs in the plain world. Its results differ from the
-//! integer results only through rounding.
+//! integer results only by rounding.
 
 use minimal_surprise_controller::network::Shape;
 use minimal_surprise_controller::{Action, Decision, Genome, SensorBits, Turn};

@@ -116,7 +116,8 @@ fn some_of_each(genomes: &[Genome]) -> Vec<Genome> {
     genomes.iter().step_by(6).cloned().collect()
 }
 
-/// Measures robot-steps per CPU-second over all genomes, repeated for at least [`SECONDS_MIN`].
+/// Measures robot-steps per CPU-second over all genomes; repeats the work for at least
+/// [`SECONDS_MIN`].
 fn speed(genomes: &[Genome], trials: &TrialSet, evaluator: &mut Evaluator) -> f64 {
     let steps = robot_steps(trials) * genomes.len() as f64;
     // Run once without timing: noise and memory are prepared only once per generation.

@@ -94,7 +94,7 @@ pub(super) trait AboutInput: std::error::Error + Send + Sync + Sized + 'static {
     fn is_bad_input(&self) -> bool;
 }
 
-/// Converts to [`BadInput`] if the input is invalid; returns other errors unchanged.
+/// Converts an error to [`BadInput`] if it is about invalid input; returns other errors unchanged.
 pub(super) fn unusable(error: impl AboutInput) -> anyhow::Error {
     if error.is_bad_input() {
         BadInput::new(error).into()
@@ -118,8 +118,8 @@ impl AboutInput for SettingError {
     }
 }
 
-/// An incomplete run is bad input; a complete run with an unreadable file is damaged, which is a
-/// failure.
+/// An incomplete run is bad input. A complete run with an unreadable file is damaged, and damage is
+/// a failure.
 impl AboutInput for ReadRunError {
     fn is_bad_input(&self) -> bool {
         match self {

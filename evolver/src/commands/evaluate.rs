@@ -124,7 +124,7 @@ pub fn evaluate(arguments: &EvaluateArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Returns the settings of the run that produced the genome, if it is in a run directory.
+/// Returns the settings of the run that produced the genome, if the genome is in a run directory.
 fn conditions_beside(genome: &Path) -> anyhow::Result<Option<Settings>> {
     let config = genome.with_file_name(CONFIG);
     if !files::exists(&config).map_err(unusable)? {

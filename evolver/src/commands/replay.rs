@@ -108,7 +108,7 @@ pub fn replay(arguments: &ReplayArgs) -> anyhow::Result<Exit> {
             .pictures
             .write(&recording, arguments.colour, existing)?;
     } else if arguments.html.is_none() {
-        // In the terminal, Ctrl-C is read as a key; this flag is set by signals from other
+        // In the terminal, Ctrl-C is read as a key; this handler is for signals from other
         // processes.
         on_signal(ask_to_stop)?;
         return in_terminal(&recording, arguments.colour, stop());

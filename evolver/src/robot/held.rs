@@ -15,8 +15,8 @@ pub enum Afterwards {
     StartsAnew,
 }
 
-/// Returns the message to print if the program exits now: that a robot is stopped, and the command
-/// that starts it.
+/// Returns the message to print if the program exits now: it states that a robot is stopped and
+/// names the command that starts the robot.
 #[must_use]
 pub fn standing() -> Option<String> {
     STANDING.lock().ok().and_then(|words| words.clone())

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Time limit for sending a request; at 9,600 baud the longest takes 160 ms.
+/// Time limit for sending a request; at 9,600 baud, the longest request takes 160 ms.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 /// Pause before a retry if a port reported that it was ready but was not.
 const PAUSE: Duration = Duration::from_millis(1);
@@ -241,8 +241,8 @@ impl Line {
     }
 }
 
-/// Returns whether a port that was ready transferred nothing. An unplugged line also transfers
-/// nothing, but then reports an error instead of being ready.
+/// Returns whether a port that reported that it was ready transferred nothing. An unplugged line
+/// also transfers nothing, but then reports an error instead of being ready.
 fn is_not_ready(transferred: &io::Result<usize>) -> bool {
     match transferred {
         Ok(count) => *count == 0,

@@ -1,7 +1,7 @@
 //! Experiments of a suite: the table `[[experiment]]`, and its combinations of settings.
 //!
-//! In addition to its own keys, the table has a key for every setting that a suite may list; its
-//! value is one value or a list.
+//! In addition to its own keys, the table has a key for every setting that a suite may list; the
+//! key's value is a single value or a list.
 
 use minimal_surprise_controller::Prediction;
 use minimal_surprise_evolution::settings::{

@@ -35,8 +35,8 @@ const STEPS_PER_GENOME: u32 = 100;
 /// Number of stack bytes used to test the stack measurement.
 const KNOWN_BYTES: usize = 400;
 
-// Starts the clock at reset: SysTick's reload value, its current value, then control (on, the
-// processor's clock, no interrupt).
+// Starts the clock at reset: writes SysTick's reload value, its current value, then its control
+// register (on, the processor's clock, no interrupt).
 global_asm!(
     ".global __pre_init",
     ".type __pre_init, %function",

@@ -9,7 +9,7 @@
 //! - never drives into a cell that its sensors report as occupied, or about which they have
 //!   reported nothing since the robot moved;
 //! - stops while its newest neighbour data is older than [`DATA_PERIODS_MAX`] periods;
-//! - stops its motors before it writes to flash, which may stall the chip;
+//! - stops its motors before it writes to flash, since a write may stall the chip;
 //! - is restarted by the watchdog if it does not reach the end of its loop, and then does not move.
 
 mod board;

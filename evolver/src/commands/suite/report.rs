@@ -103,7 +103,7 @@ fn needs_of_report(plan: &Plan, suite: &Suite) -> Needs {
     most
 }
 
-/// Writes the gallery of finished runs; replaces an earlier one.
+/// Writes the gallery of finished runs; replaces an earlier gallery.
 fn write_gallery(finished: &[PathBuf], out: &Path) -> anyhow::Result<DamagedRuns> {
     let written = gallery::write(finished, out, Existing::Replace).map_err(unusable)?;
     show_line!(

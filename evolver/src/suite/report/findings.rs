@@ -133,7 +133,7 @@ fn groups<'a, const N: usize>(
     found?.try_into().ok()
 }
 
-/// Returns the verdict on a statement about all runs, which a single run can contradict.
+/// Returns the verdict on a statement about all runs; a single run can contradict such a statement.
 fn universal(groups: &[&Group], is_true: bool) -> Verdict {
     if !is_true && groups.iter().all(|group| !group.runs.is_empty()) {
         Verdict::Differs

@@ -64,7 +64,7 @@ pub struct Written {
 /// Name of the gallery's folder, in the report's directory.
 pub const GALLERY: &str = "gallery";
 
-/// File that marks a directory as a report, which a new report may replace.
+/// File that marks a directory as a report; a new report may replace such a directory.
 const MARKER: &str = ".evolver-report";
 
 /// Returns whether a new report would overwrite only an earlier report: the directory must be new,

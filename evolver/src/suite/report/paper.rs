@@ -199,7 +199,7 @@ pub struct DamageValues {
     pub source: Source,
     /// The resilience experiment.
     pub resilience: String,
-    /// Name of the row, which describes the damage.
+    /// Name of the row; the name describes the damage.
     pub row: String,
     /// Fitness.
     pub fitness: MeanMedian,
@@ -224,7 +224,8 @@ pub struct Raised {
 }
 
 impl PaperValues {
-    /// Returns the numbers to compare with: all for the paper's suite, none for other suites.
+    /// Returns the paper's numbers that a report compares with: all for the paper's suite, none for
+    /// other suites.
     #[must_use]
     pub fn for_suite(reference: Option<Reference>) -> Self {
         let all: Self = toml::from_str(include_str!("../paper-values.toml"))

@@ -24,7 +24,7 @@ pub(super) fn reading(report: &SuiteReport, ours: &str, paper: &str) -> String {
 pub(super) const SHARED: &str = "Experiments with the same settings and seeds share their \
                                  runs, so their results are not independent.";
 
-/// Returns the note on creating the gallery, for reports without one.
+/// Returns the note on how to create the gallery, for reports without a gallery.
 pub(super) fn to_look_at(report: &SuiteReport) -> String {
     format!(
         "{} creates a gallery of all runs: final states and replays.",

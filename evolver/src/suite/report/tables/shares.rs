@@ -13,7 +13,7 @@ use minimal_surprise_controller::{Prediction, Template};
 use minimal_surprise_evolution::reevaluation::mean;
 use minimal_surprise_sim::structures::{LineOrientation, Structure};
 
-/// Category of genomes without one line orientation in most of their new starts.
+/// Category of genomes that do not form the same line orientation in most of their new starts.
 const DIVERSE: &str = "diverse";
 
 /// Data of a row of shares: each run's categories, several if tied.

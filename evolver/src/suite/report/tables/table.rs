@@ -1,16 +1,16 @@
-//! Tables, and their values with the paper's.
+//! Tables, with our values beside the paper's values.
 
 use crate::suite::report::numbers::{number, p_value};
 use crate::suite::report::statistics::{Interval, RUNS_MIN, SIGN_TEST, Test, median_interval};
 use minimal_surprise_evolution::reevaluation::median;
 use serde::Serialize;
 
-/// One of our numbers with the paper's number.
+/// One of our numbers, with the paper's number.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Value {
-    /// The row, with its experiment.
+    /// Name of the row, with the row's experiment.
     pub setting: String,
-    /// The column.
+    /// Name of the column.
     pub what: String,
     /// Number of runs, genomes or repetitions behind our number.
     pub of: usize,
