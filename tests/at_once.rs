@@ -121,7 +121,7 @@ fn assert_success(outputs: &[Output], what: &str) {
     }
 }
 
-/// Reads all files below a folder, including hidden files, but excluding those that contain the
+/// Reads all files below a folder, including hidden files, except the files that contain the
 /// command and the duration of a run.
 fn contents(evolver: &Evolver, folder: &str) -> BTreeMap<String, Vec<u8>> {
     let files = evolver.files().into_iter();

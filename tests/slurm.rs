@@ -56,7 +56,7 @@ impl Slurm {
             return None;
         }
         tools::require(installed())?;
-        // A failed test that held the lock has still stopped its cluster.
+        // Even a failed test has stopped its cluster before releasing the lock.
         let one = ONE_CLUSTER.lock().unwrap_or_else(|e| e.into_inner());
         let free = [(); 4].map(|()| TcpListener::bind("127.0.0.1:0").expect("a free port"));
         let ports = free.map(|port| port.local_addr().expect("it is bound").port());

@@ -28,7 +28,7 @@ pub enum ProgressMode {
     None,
 }
 
-/// Display of the progress of one run.
+/// Progress display for one run.
 #[derive(Debug)]
 pub struct Progress {
     shown: Shown,

@@ -11,7 +11,7 @@ use std::cell::{Cell, RefCell};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Display of the progress of one process's runs.
+/// Progress display for the runs of one process.
 #[derive(Debug)]
 pub struct SuiteProgress<'a> {
     shown: Shown,

@@ -16,7 +16,7 @@ pub const PAPER: &str = include_str!("paper.toml");
 pub struct Suite {
     /// Name of the suite.
     pub name: String,
-    /// Source of the numbers that the report compares with.
+    /// Source of the numbers that the report compares its results with.
     pub compare_with: Option<Reference>,
     /// Evolutions.
     #[serde(default, rename = "experiment")]
@@ -29,7 +29,7 @@ pub struct Suite {
     pub resiliences: Vec<Resilience>,
 }
 
-/// Source of the numbers that the report compares with.
+/// Source of the numbers that the report compares its results with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reference {

@@ -33,7 +33,7 @@ use wheels::{PWM_HZ, Wheel, Wheels};
 const BAUD: u32 = 115_200;
 
 /// The watchdog's time-out at its nominal clock. The time-out must exceed the time to erase a
-/// sector (at most 4 s) even at the fastest clock: 47 kHz instead of 32 kHz shortens it to 5.4 s.
+/// sector (at most 4 s) even at the fastest clock: at 47 kHz instead of 32 kHz, it is 5.4 s.
 const WATCHDOG_MS: u32 = 8_000;
 
 /// SysTick's reload value; SysTick counts every eighth tick of the processor's clock.

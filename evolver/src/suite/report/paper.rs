@@ -6,7 +6,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// All numbers from the paper that the report compares with.
+/// All numbers from the paper that the report compares our results with.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PaperValues {
@@ -224,8 +224,8 @@ pub struct Raised {
 }
 
 impl PaperValues {
-    /// Returns the paper's numbers that a report compares with: all for the paper's suite, none for
-    /// other suites.
+    /// Returns the paper's numbers that a report compares its results with: all for the paper's
+    /// suite, none for other suites.
     #[must_use]
     pub fn for_suite(reference: Option<Reference>) -> Self {
         let all: Self = toml::from_str(include_str!("../paper-values.toml"))

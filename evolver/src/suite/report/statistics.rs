@@ -298,8 +298,8 @@ mod tests {
         // Examples: Fisher's tea tasting, and the convictions of twins in R's documentation.
         assert_close(fisher(&[3, 1], &[1, 3]).p, 0.485_714, 1e-6);
         assert_close(fisher(&[2, 15], &[10, 3]).p, 0.000_536_7, 1e-7);
-        // Computed by hand for 3 | 0 0 against 0 | 2 1: of 20 arrangements in total, those of the
-        // tables that have at most 1 arrangement.
+        // Computed by hand for the rows 3, 0, 0 and 0, 2, 1: 2 of all 20 arrangements belong to
+        // tables that have a single arrangement.
         assert_close(fisher(&[3, 0, 0], &[0, 2, 1]).p, 0.1, 1e-9);
         assert_eq!(fisher(&[4, 0], &[9, 0]).p, 1.0);
         assert_eq!(fisher(&[0, 0], &[9, 1]).p, 1.0);

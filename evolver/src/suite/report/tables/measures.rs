@@ -167,8 +167,8 @@ struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    /// Returns whether the table has a column for this measure: only if the paper has a number for
-    /// it.
+    /// Returns whether the table has a column for this measure; it has one only if the paper has a
+    /// number for the measure.
     fn has(&self, measure: &str) -> bool {
         measure == MEDIAN_BEST_FITNESS
             || self
