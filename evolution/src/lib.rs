@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+pub mod baseline;
 pub mod checkpoint;
 pub mod damaged_runs;
 #[cfg(feature = "files")]
@@ -26,6 +27,7 @@ pub mod run_hash;
 pub mod run_id;
 pub mod selection;
 pub mod settings;
+pub mod statistics;
 pub mod steps_hash;
 pub mod text;
 pub mod time_spent;

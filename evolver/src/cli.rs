@@ -1,5 +1,6 @@
 //! The command line: parses the arguments and calls a command.
 
+use crate::commands::baseline::{BaselineArgs, baseline};
 use crate::commands::bench::bench;
 use crate::commands::classify::classify;
 use crate::commands::damage::{DamageArgs, damage};
@@ -58,6 +59,9 @@ enum Command {
     /// Re-evaluate a genome from new starts, optionally with different grids, noise and swarm
     /// sizes.
     Evaluate(EvaluateArgs),
+    /// Show the fitness and the structures that chance gives: a constant prediction, random
+    /// placements, random genomes.
+    Baseline(BaselineArgs),
     /// Remove or reposition robots of a structure, and measure the swarm's recovery.
     Damage(DamageArgs),
     /// Export a run or a genome to the format of another program.
@@ -140,6 +144,7 @@ fn run(arguments: Cli) -> anyhow::Result<Exit> {
         Some(Command::Replay(arguments)) => replay(&arguments),
         Some(Command::Gallery(arguments)) => gallery(&arguments),
         Some(Command::Evaluate(arguments)) => evaluate(&arguments).map(done),
+        Some(Command::Baseline(arguments)) => baseline(&arguments).map(done),
         Some(Command::Damage(arguments)) => damage(&arguments).map(done),
         Some(Command::Export(arguments)) => export(&arguments).map(done),
         Some(Command::Flash(arguments)) => flash(&arguments).map(done),

@@ -123,6 +123,8 @@ pub struct Measures {
     mispredicted_so_far: u64,
     /// Number of times that each sensor was predicted to be occupied.
     predicted_occupied: [u64; MAX_SENSORS],
+    /// Number of times that each sensor read occupied.
+    read_occupied: [u64; MAX_SENSORS],
 }
 
 impl Measures {
@@ -139,6 +141,7 @@ impl Measures {
             mispredicted: Vec::new(),
             mispredicted_so_far: 0,
             predicted_occupied: [0; MAX_SENSORS],
+            read_occupied: [0; MAX_SENSORS],
         }
     }
 
@@ -197,8 +200,11 @@ impl Measures {
             let differing = prediction.differing(reading);
             *now = differing as u8;
             mispredicted += u64::from(differing);
-            for (sensor, count) in self.predicted_occupied.iter_mut().enumerate() {
-                *count += u64::from(prediction.get(sensor));
+            let counts = self.predicted_occupied.iter_mut();
+            let counts = counts.zip(&mut self.read_occupied).enumerate();
+            for (sensor, (predicted, read)) in counts {
+                *predicted += u64::from(prediction.get(sensor));
+                *read += u64::from(reading.get(sensor));
             }
         }
         self.mispredicted.push(mispredicted);
@@ -235,6 +241,15 @@ impl Measures {
     pub fn average_prediction(&self) -> Vec<f64> {
         let readings = self.robots() * u64::from(self.steps());
         let counts = &self.predicted_occupied[..self.model.sensors()];
+        counts.iter().map(|&count| ratio(count, readings)).collect()
+    }
+
+    /// Returns the average reading of each sensor, 1/(N·T) Σₜ Σₙ sₙʳ(t), with noise, from 0 (always
+    /// empty) to 1 (always occupied).
+    #[must_use]
+    pub fn average_reading(&self) -> Vec<f64> {
+        let readings = self.robots() * u64::from(self.steps());
+        let counts = &self.read_occupied[..self.model.sensors()];
         counts.iter().map(|&count| ratio(count, readings)).collect()
     }
 

@@ -35,6 +35,8 @@ pub enum Purpose {
     /// Crossover of a genome: the decision to cross, the second parent and the weights; index: slot
     /// of the genome.
     Crossover = 10,
+    /// Poses of a state drawn as a baseline; generation: 0, index: draw.
+    Placement = 11,
 }
 
 /// The root of all streams of a run.

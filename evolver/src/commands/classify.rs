@@ -3,12 +3,13 @@
 use super::BadInput;
 use super::errors::unusable;
 use crate::report::structures::{self, Classified};
+use minimal_surprise_evolution::baseline::{Chance, FitnessBaselines, PLACEMENTS, ROBOTS_MAX};
 use minimal_surprise_evolution::files::{self, DATA_BYTES_MAX};
 use minimal_surprise_evolution::finished_run::{FinishedRun, parse_final_state};
 use minimal_surprise_evolution::text::{self, TextError};
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::structures::classify as find_structures;
-use minimal_surprise_sim::{Grid, Pose, drawing};
+use minimal_surprise_sim::{Grid, Pose, SeedTree, drawing};
 use std::path::Path;
 
 /// Classifies a run directory, a `final.json`, an `agent_trajectory`, or a drawing.
@@ -16,22 +17,36 @@ use std::path::Path;
 /// # Errors
 /// [`BadInput`] if the file or run cannot be read or contains no swarm.
 pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
-    let (grid, poses, measures) = if path.is_dir() {
+    let (grid, poses, measures, baselines) = if path.is_dir() {
         let finished = FinishedRun::read_and_check(path).map_err(unusable)?;
         let measures = finished.measures()?;
-        let grid = finished.settings.scenario().grid();
-        (grid, finished.final_poses, Some(measures))
+        let scenario = finished.settings.scenario();
+        let baselines = FitnessBaselines::of_run(scenario, &measures);
+        let grid = scenario.grid();
+        (grid, finished.final_poses, Some(measures), Some(baselines))
     } else {
         let (grid, poses) = read_state(path)?;
-        (grid, poses, None)
+        (grid, poses, None, None)
     };
     let found = find_structures(grid, &poses)
         .map_err(|error| BadInput::new(format!("{}: {error}", path.display())))?;
+    let robots = poses.len() as u32;
+    let chance = match robots {
+        1..=ROBOTS_MAX => Some(Chance::of_placements(
+            grid,
+            robots,
+            SeedTree::new(0),
+            PLACEMENTS,
+        )?),
+        _ => None,
+    };
     let classified = Classified {
         grid,
         poses: &poses,
         found: &found,
         measures: measures.as_ref(),
+        baselines: baselines.as_ref(),
+        chance: chance.as_ref(),
     };
     if json {
         show_line!("{}", structures::json(&classified));

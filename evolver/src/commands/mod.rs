@@ -1,5 +1,6 @@
 //! The commands, one file each: check the arguments, do the work, print the result.
 
+pub mod baseline;
 pub mod bench;
 pub mod classify;
 pub mod damage;

@@ -47,36 +47,82 @@ fn values_of<'a>(matches: &ArgMatches, settings: impl Iterator<Item = &'a Settin
     overrides
 }
 
+/// Makes a type with [`Overrides`] the flags of some settings.
+macro_rules! flags {
+    ($name:ident, $settings:expr, $arg:expr) => {
+        impl Args for $name {
+            fn augment_args(command: Command) -> Command {
+                let arg: fn(&'static Setting) -> Arg = $arg;
+                command.args($settings.map(arg))
+            }
+
+            fn augment_args_for_update(command: Command) -> Command {
+                Self::augment_args(command)
+            }
+        }
+
+        impl FromArgMatches for $name {
+            fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+                Ok(Self(values_of(matches, $settings)))
+            }
+
+            fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+                *self = Self::from_arg_matches(matches)?;
+                Ok(())
+            }
+        }
+    };
+}
+
 /// All settings as flags.
 #[derive(Clone, Debug, Default)]
 pub struct SettingFlags(pub(super) Overrides);
 
-impl Args for SettingFlags {
-    fn augment_args(command: Command) -> Command {
-        command.args(SETTINGS.iter().map(|setting| {
-            let arg = arg(setting, with_default(setting.meaning(), setting.default));
-            // A run is always resumed with its recorded settings; only the number of threads may
-            // differ.
-            match setting.name {
-                "threads" => arg,
-                _ => arg.conflicts_with("resume"),
-            }
-        }))
+flags!(SettingFlags, SETTINGS.iter(), |setting| {
+    let arg = arg(setting, with_default(setting.meaning(), setting.default));
+    // A run is resumed with its own settings, on any number of threads.
+    match setting.name {
+        "threads" => arg,
+        _ => arg.conflicts_with("resume"),
     }
+});
 
-    fn augment_args_for_update(command: Command) -> Command {
-        Self::augment_args(command)
-    }
+/// Settings that baselines depend on.
+const BASELINE: [&str; 9] = [
+    "sensor-model",
+    "predefine",
+    "predefine-partly",
+    "grid",
+    "robots",
+    "steps",
+    "noise",
+    "repetitions",
+    "seed",
+];
+
+fn baseline() -> impl Iterator<Item = &'static Setting> {
+    SETTINGS.iter().filter(|s| BASELINE.contains(&s.name))
 }
 
-impl FromArgMatches for SettingFlags {
-    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        Ok(Self(values_of(matches, SETTINGS.iter())))
-    }
+/// The flags for baselines.
+#[derive(Clone, Debug, Default)]
+pub struct BaselineFlags(Overrides);
 
-    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        *self = Self::from_arg_matches(matches)?;
-        Ok(())
+flags!(BaselineFlags, baseline(), |setting| {
+    let (meaning, default) = match setting.name {
+        "seed" => ("Root of all random numbers", "0"),
+        _ => (setting.meaning(), setting.default),
+    };
+    arg(setting, with_default(meaning, default))
+});
+
+impl BaselineFlags {
+    /// Returns the settings to compute baselines for.
+    ///
+    /// # Errors
+    /// [`BadInput`] if a flag is invalid; the message lists the valid values.
+    pub(super) fn settings(&self) -> Result<Settings, BadInput> {
+        Settings::resolve(&self.0, || 0).map_err(BadInput::new)
     }
 }
 
@@ -91,40 +137,21 @@ fn conditions() -> impl Iterator<Item = &'static Setting> {
 #[derive(Clone, Debug, Default)]
 pub struct GenomeConditions(Overrides);
 
-impl Args for GenomeConditions {
-    fn augment_args(command: Command) -> Command {
-        command.args(conditions().map(|setting| {
-            let (meaning, default) = match setting.name {
-                "seed" => (
-                    "Root of all random numbers",
-                    "the seed it evolved with, else 0",
-                ),
-                _ => (setting.meaning(), setting.default),
-            };
-            let help = format!(
-                "For a genome: {}{}",
-                meaning[..1].to_lowercase(),
-                &meaning[1..]
-            );
-            arg(setting, with_default(&help, default))
-        }))
-    }
-
-    fn augment_args_for_update(command: Command) -> Command {
-        Self::augment_args(command)
-    }
-}
-
-impl FromArgMatches for GenomeConditions {
-    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        Ok(Self(values_of(matches, conditions())))
-    }
-
-    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        *self = Self::from_arg_matches(matches)?;
-        Ok(())
-    }
-}
+flags!(GenomeConditions, conditions(), |setting| {
+    let (meaning, default) = match setting.name {
+        "seed" => (
+            "Root of all random numbers",
+            "the seed it evolved with, else 0",
+        ),
+        _ => (setting.meaning(), setting.default),
+    };
+    let help = format!(
+        "For a genome: {}{}",
+        meaning[..1].to_lowercase(),
+        &meaning[1..]
+    );
+    arg(setting, with_default(&help, default))
+});
 
 impl GenomeConditions {
     /// Rejects these flags if the file already records the conditions.

@@ -1,5 +1,6 @@
 //! Output for users and other programs: progress, tables, summaries and JSON.
 
+pub mod baseline;
 pub mod embedding;
 pub mod picture;
 pub mod progress;

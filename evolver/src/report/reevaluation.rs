@@ -1,8 +1,10 @@
 //! Tables and JSON of re-evaluations and of resilience to damage.
 
-use minimal_surprise_evolution::reevaluation::{Rerun, ResilienceRow, mean, median};
+use minimal_surprise_evolution::baseline::{ceiling, constant_fitness, skill};
+use minimal_surprise_evolution::reevaluation::{Rerun, ResilienceRow};
 use minimal_surprise_evolution::run_files::{self, SCHEMA_VERSION};
 use minimal_surprise_evolution::settings::add_seed;
+use minimal_surprise_evolution::statistics::{mean, median};
 use minimal_surprise_sim::Scenario;
 use minimal_surprise_sim::structures::{LineOrientation, Structure, in_words};
 use serde_json::{Map, Value, json};
@@ -16,6 +18,15 @@ pub struct Condition {
     pub noise: f64,
     /// The runs, one per start.
     pub reruns: Vec<Rerun>,
+}
+
+impl Condition {
+    /// Returns the skill of the mean fitness.
+    fn skill(&self) -> Option<f64> {
+        let fitness = mean(&fitnesses(&self.reruns));
+        let constant = constant_fitness(&self.scenario);
+        skill(fitness, constant, ceiling(&self.scenario))
+    }
 }
 
 /// Returns the number of runs that each structure dominates; in a tie of k structures, each counts
@@ -56,6 +67,8 @@ pub fn conditions_text(conditions: &[Condition]) -> String {
         "noise",
         "mean fitness",
         "median",
+        "constant",
+        "skill",
         "structures",
         "lines",
     ]);
@@ -76,11 +89,15 @@ pub fn conditions_text(conditions: &[Condition]) -> String {
             condition.noise.to_string(),
             format!("{:.4}", mean(&values)),
             format!("{:.4}", median(&values)),
+            format!("{:.4}", constant_fitness(&condition.scenario)),
+            condition
+                .skill()
+                .map_or("undefined".to_owned(), |skill| format!("{skill:.4}")),
             structures.join(", "),
             orientation(&condition.reruns),
         ]);
     }
-    super::right_aligned(table, &[1, 2, 3, 4])
+    super::right_aligned(table, &[1, 2, 3, 4, 5, 6])
 }
 
 /// Formats a count without unnecessary decimals.
@@ -117,6 +134,9 @@ pub fn conditions_json(conditions: &[Condition], seed: u64) -> Value {
                 "noise": condition.noise,
                 "steps": condition.scenario.steps(),
                 "mean_fitness": mean(&values),
+                "constant_fitness": constant_fitness(&condition.scenario),
+                "ceiling": ceiling(&condition.scenario),
+                "skill": condition.skill(),
                 "median_fitness": median(&values),
                 "structures": names,
                 "starts": starts,

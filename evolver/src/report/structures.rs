@@ -1,7 +1,10 @@
 //! Structures of a swarm, as a picture and a table, or as JSON.
 
+use super::baseline;
 use super::picture::picture;
+use minimal_surprise_evolution::baseline::{Chance, FitnessBaselines, ROBOTS_MAX};
 use minimal_surprise_evolution::run_files::{MeasuresOfRun, SCHEMA_VERSION, names};
+use minimal_surprise_evolution::statistics::mean;
 use minimal_surprise_sim::metrics::Measures;
 use minimal_surprise_sim::structures::{LineCounts, Structure, Structures, in_words};
 use minimal_surprise_sim::{Grid, Pose};
@@ -19,6 +22,10 @@ pub struct Classified<'a> {
     pub found: &'a Structures,
     /// Measures of the run that ended in this state.
     pub measures: Option<&'a Measures>,
+    /// Baselines of the run's fitness.
+    pub baselines: Option<&'a FitnessBaselines>,
+    /// Structures of random placements; `None` if the swarm is too large.
+    pub chance: Option<&'a Chance>,
 }
 
 /// Returns the dominant structure in words: `lines`, `lines and pairs (tied)`, `nothing`.
@@ -49,6 +56,8 @@ pub fn text(classified: &Classified<'_>) -> String {
         poses,
         found,
         measures,
+        baselines,
+        chance,
     } = classified;
     let mut text = highlighted(classified);
     let _ = write!(
@@ -57,16 +66,38 @@ pub fn text(classified: &Classified<'_>) -> String {
         poses.len(),
         name(found)
     );
-    let mut table = super::table(&["structure", "robots", "share", ""]);
+    let mut table = super::table(&["structure", "robots", "share", "by chance", "p", ""]);
     for structure in Structure::ALL {
+        let share = found.share(structure);
+        let (by_chance, p) = match chance {
+            None => (String::new(), String::new()),
+            Some(chance) => (
+                format!("{:.1} %", 100.0 * mean(&chance.sorted_shares(structure))),
+                format!("{:.3}", chance.p_of_share(structure, share)),
+            ),
+        };
         table.add_row([
             structure.name().to_owned(),
             found.count(structure).to_string(),
-            format!("{:.1} %", 100.0 * found.share(structure)),
+            format!("{:.1} %", 100.0 * share),
+            by_chance,
+            p,
             details(found, structure),
         ]);
     }
-    let _ = writeln!(text, "{}", super::right_aligned(table, &[1, 2]));
+    let _ = writeln!(text, "{}", super::right_aligned(table, &[1, 2, 3, 4]));
+    let _ = match chance {
+        Some(chance) => writeln!(
+            text,
+            "\nby chance: mean share in {} random placements; p: probability that a random\n\
+             placement has a share at least as large",
+            chance.draws()
+        ),
+        None => writeln!(
+            text,
+            "\nby chance: not computed for more than {ROBOTS_MAX} robots; see evolver baseline"
+        ),
+    };
     if let Some(measures) = measures {
         let temperature = measures.temperature();
         let last = temperature.last().copied().unwrap_or(0.0);
@@ -80,6 +111,22 @@ pub fn text(classified: &Classified<'_>) -> String {
             measures.movement(),
             measures.intended_movement(),
             period = measures.period(),
+        );
+    }
+    if let Some(baselines) = baselines {
+        let ratio = |skill: Option<f64>| match skill {
+            Some(skill) => format!("{skill:.4}"),
+            None => "undefined".to_owned(),
+        };
+        let _ = write!(
+            text,
+            "skill              {}   (0: constant prediction on random states, {:.4}; 1: {:.4})\n\
+             model gain         {}   (0: constant prediction on this run's readings, {:.4})\n",
+            ratio(baselines.skill),
+            baselines.constant_fitness,
+            baselines.ceiling,
+            ratio(baselines.model_gain),
+            baselines.constant_fitness_of_readings,
         );
     }
     text
@@ -127,6 +174,9 @@ pub fn json(classified: &Classified<'_>) -> Value {
                 "robots": found.count(structure),
                 "share": found.share(structure),
                 "members": members,
+                "p_by_chance": classified.chance.map(|chance| {
+                    chance.p_of_share(structure, found.share(structure))
+                }),
             }),
         );
     }
@@ -150,5 +200,7 @@ pub fn json(classified: &Classified<'_>) -> Value {
         },
         "average_prediction": classified.measures.map(Measures::average_prediction),
         "measures": classified.measures.map(MeasuresOfRun::from),
+        "baselines": classified.baselines,
+        "chance": classified.chance.map(baseline::chance),
     })
 }

@@ -32,6 +32,8 @@ pub fn evolved(experiment: &Experiment, result: &EvolutionResult, directory: &Pa
         poses: &result.outcome.final_poses,
         found: &result.structures,
         measures: Some(&result.measures),
+        baselines: None,
+        chance: None,
     };
     let program = program();
     let at = |file: &str| shell_path(&directory.join(file));

@@ -3,7 +3,7 @@
 use super::gather::{Gathered, GatheredRun, Group, Resilient};
 use super::numbers::{csv_text, plural};
 use super::paper::PaperValues;
-use super::statistics::quantile;
+use minimal_surprise_evolution::statistics::quantile;
 use minimal_surprise_replay::palette::LIGHT;
 use minimal_surprise_replay::pictures::{Chart, Content, Panel, PictureError, sheet};
 use minimal_surprise_replay::scene::{Ink, Scene};

@@ -4,7 +4,7 @@ use super::gather::{Gathered, GatheredRun, Group, Resilient, regained};
 use super::paper::{PaperValues, is_grouping};
 use super::statistics::{RUNS_MIN, Test, fisher, mann_whitney, median_interval, sign};
 use super::tables::MEDIAN_BEST_FITNESS;
-use minimal_surprise_evolution::reevaluation::{mean, median};
+use minimal_surprise_evolution::statistics::{mean, median};
 use minimal_surprise_sim::structures::{LineOrientation, Structure};
 use serde::{Serialize, Serializer};
 use std::collections::BTreeSet;

@@ -9,10 +9,9 @@ use minimal_surprise_controller::Controller;
 use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_evolution::files::FileError;
 use minimal_surprise_evolution::finished_run::FinishedRun;
-use minimal_surprise_evolution::reevaluation::{
-    ResilienceRow, after_damage, mean, rerun, resilience,
-};
+use minimal_surprise_evolution::reevaluation::{ResilienceRow, after_damage, rerun, resilience};
 use minimal_surprise_evolution::settings::Settings;
+use minimal_surprise_evolution::statistics::mean;
 use minimal_surprise_evolution::text::hex;
 use minimal_surprise_sim::evaluation::run;
 use minimal_surprise_sim::structures::{LineCounts, LineOrientation, Structure, classify};

@@ -156,7 +156,7 @@ mod tests {
     use crate::suite::plan::Plan;
     use crate::suite::work::{Outcome, work_on};
     use minimal_surprise_evolution::finished_run::FinishedRun;
-    use minimal_surprise_evolution::reevaluation::median;
+    use minimal_surprise_evolution::statistics::median;
     use std::collections::{BTreeMap, BTreeSet};
     use std::sync::atomic::AtomicBool;
 

@@ -2,7 +2,7 @@
 //!
 //! All random draws use a fixed seed, so that the same runs give the same report.
 
-use minimal_surprise_evolution::reevaluation::median;
+use minimal_surprise_evolution::statistics::{median, quantile};
 use minimal_surprise_sim::seed::uniform_below;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -95,18 +95,6 @@ pub fn median_interval(values: &[f64]) -> Option<Interval> {
         low: quantile(&medians, 0.025),
         high: quantile(&medians, 0.975),
     })
-}
-
-/// Returns the quantile of sorted values, linearly interpolated; 0 if there are none.
-#[must_use]
-pub fn quantile(ascending: &[f64], share: f64) -> f64 {
-    let Some(last) = ascending.len().checked_sub(1) else {
-        return 0.0;
-    };
-    let place = share * last as f64;
-    let below = place.floor() as usize;
-    let above = (below + 1).min(last);
-    ascending[below] + (place - below as f64) * (ascending[above] - ascending[below])
 }
 
 /// Tests whether two rows of counts may come from the same distribution: Fisher's exact test in
@@ -343,13 +331,6 @@ mod tests {
         let second = [1.15, 0.88, 0.90, 0.74, 1.21];
         assert_close(mann_whitney(&first, &second).p, 0.2446, 1e-4);
         assert_eq!(mann_whitney(&[1.0, 1.0], &[1.0]).p, 1.0);
-    }
-
-    #[test]
-    fn quantiles_lie_linearly_between_values() {
-        let values = [1.0, 2.0, 4.0];
-        let found = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| quantile(&values, share));
-        assert_eq!(found, [1.0, 1.5, 2.0, 3.0, 4.0]);
     }
 
     #[test]

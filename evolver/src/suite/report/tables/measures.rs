@@ -6,7 +6,7 @@ use crate::suite::report::paper::{
     Distribution, MeanMedian, Number, Of, PaperValues, StructureValues, is_grouping,
 };
 use crate::suite::report::statistics::{fisher, median_interval, median_is, wilson};
-use minimal_surprise_evolution::reevaluation::{mean, median};
+use minimal_surprise_evolution::statistics::{mean, median};
 use minimal_surprise_sim::structures::Structure;
 
 /// Name of the measure that the paper gives for most settings.

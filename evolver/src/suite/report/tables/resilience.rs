@@ -5,7 +5,7 @@ use crate::suite::report::gather::Resilient;
 use crate::suite::report::numbers::plural;
 use crate::suite::report::paper::{DAMAGED_GRID, PaperValues, Source};
 use crate::suite::report::statistics::median_interval;
-use minimal_surprise_evolution::reevaluation::{mean, median};
+use minimal_surprise_evolution::statistics::{mean, median};
 
 /// Creates Tables 7 and 8.
 pub(super) fn resilience(resilient: &Resilient, paper: &PaperValues) -> Table {

@@ -10,7 +10,7 @@ use crate::suite::report::paper::{
 };
 use crate::suite::report::statistics::{fisher, wilson};
 use minimal_surprise_controller::{Prediction, Template};
-use minimal_surprise_evolution::reevaluation::mean;
+use minimal_surprise_evolution::statistics::mean;
 use minimal_surprise_sim::structures::{LineOrientation, Structure};
 
 /// Category of genomes that do not form the same line orientation in most of their new starts.

@@ -2,7 +2,7 @@
 
 use crate::suite::report::numbers::{number, p_value};
 use crate::suite::report::statistics::{Interval, RUNS_MIN, SIGN_TEST, Test, median_interval};
-use minimal_surprise_evolution::reevaluation::median;
+use minimal_surprise_evolution::statistics::median;
 use serde::Serialize;
 
 /// One of our numbers, with the paper's number.
