@@ -14,7 +14,9 @@ fn words(text: &str) -> Vec<&str> {
 }
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 /// F₀ by the formula of `docs/measures.md`.
@@ -33,13 +35,19 @@ fn baselines_are_the_same_on_any_number_of_threads() {
     let one = json(&evolver.run(&words(&format!("{SMALL} --threads 1"))));
     let three = json(&evolver.run(&words(&format!("{SMALL} --threads 3"))));
     assert_eq!(one, three);
-    assert_eq!(number(&one["constant_fitness"]), constant_fitness(72.0, 20.0, 0.125));
+    assert_eq!(
+        number(&one["constant_fitness"]),
+        constant_fitness(72.0, 20.0, 0.125)
+    );
     assert_eq!(number(&one["ceiling"]), 0.875);
     assert_eq!(one["placements"]["draws"], 60);
     assert_eq!(one["genome_fitness"].as_array().unwrap().len(), 9);
     let different = SMALL.replace("--seed 5", "--seed 6");
     let different = json(&evolver.run(&words(&different)));
-    assert_ne!(one["placements"]["structures"], different["placements"]["structures"]);
+    assert_ne!(
+        one["placements"]["structures"],
+        different["placements"]["structures"]
+    );
 }
 
 #[test]
@@ -48,7 +56,9 @@ fn random_placements_on_15x15_are_groupings_and_on_20x20_dispersed() {
     let named = |grid: &str, structures: &[&str]| -> f64 {
         let flags = format!("baseline --grid {grid} --genomes 1 --steps 1 --json");
         let placements = &json(&evolver.run(&words(&flags)))["placements"]["structures"];
-        let named = structures.iter().map(|name| number(&placements[name]["named_share"]));
+        let named = structures
+            .iter()
+            .map(|name| number(&placements[name]["named_share"]));
         named.sum()
     };
     assert!(named("15x15", &["aggregation", "clustering", "loose grouping"]) > 0.9);
@@ -65,10 +75,17 @@ fn invalid_numbers_of_draws_and_settings_are_bad_input() {
         ("--grid 3", "--grid = 3"),
         ("--robots 226", "--robots = 226"),
         ("--noise 1.5", "--noise = 1.5"),
-        ("--grid 5000x5000 --robots 20000000 --placements 1000000", "memory"),
+        (
+            "--grid 5000x5000 --robots 20000000 --placements 1000000",
+            "memory",
+        ),
     ] {
         let run = evolver.run(&[&["baseline"], words(flags).as_slice()].concat());
-        assert_eq!((run.code, run.stdout.as_str()), (Some(2), ""), "{flags}: {run:?}");
+        assert_eq!(
+            (run.code, run.stdout.as_str()),
+            (Some(2), ""),
+            "{flags}: {run:?}"
+        );
         assert!(run.stderr.contains(problem), "{flags}: {run:?}");
     }
 }
@@ -98,10 +115,16 @@ fn classify_and_evaluate_compare_fitness_and_shares_with_chance() {
         let p = number(&structure["p_by_chance"]);
         assert!(p > 0.0 && p <= 1.0, "{name}");
         let share = number(&structure["share"]);
-        assert!(share > 0.0 || p == 1.0, "chance has at least no robot in a {name}");
+        assert!(
+            share > 0.0 || p == 1.0,
+            "chance has at least no robot in a {name}"
+        );
     }
     let text = evolver.run(&words("classify run")).stdout;
-    assert!(text.contains("skill") && text.contains("model gain"), "{text}");
+    assert!(
+        text.contains("skill") && text.contains("model gain"),
+        "{text}"
+    );
 
     // A file of poses has no noise and no fitness, but its shares can be compared.
     let of_file = json(&evolver.run(&words("classify run/final.json --json")));
@@ -126,5 +149,8 @@ fn the_chance_of_a_swarm_of_more_than_a_thousand_robots_is_not_computed() {
     let classified = json(&evolver.run(&words("classify large.txt --json")));
     assert_eq!(classified["chance"], Value::Null);
     let text = evolver.run(&words("classify large.txt")).stdout;
-    assert!(text.contains("not computed for more than 1000 robots"), "{text}");
+    assert!(
+        text.contains("not computed for more than 1000 robots"),
+        "{text}"
+    );
 }

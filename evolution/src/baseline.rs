@@ -292,7 +292,7 @@ mod tests {
         assert_eq!(skill(0.6, 0.6, 0.9), Some(0.0));
         assert!(skill(0.5, 0.6, 0.9).unwrap() < 0.0);
         assert_eq!(skill(0.5, 0.495, 0.5), None);
-        assert_eq!(skill(0.99, 0.99, 1.0), None);
+        assert_eq!(skill(0.991, 0.991, 1.0), None);
     }
 
     #[test]
