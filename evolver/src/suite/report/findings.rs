@@ -1,6 +1,6 @@
 //! The paper's main findings, compared with our runs.
 
-use super::gather::{Gathered, GatheredRun, Group, Resilient, regained};
+use super::gather::{Gathered, GatheredRun, Group, GroupChance, Resilient, regained};
 use super::paper::{PaperValues, is_grouping};
 use super::statistics::{RUNS_MIN, Test, fisher, mann_whitney, median_interval, sign};
 use super::tables::MEDIAN_BEST_FITNESS;
@@ -21,7 +21,10 @@ const PRINTED: f64 = 1e-9;
 pub enum Verdict {
     /// The finding holds.
     Holds,
-    /// The runs show the tendency, but it may be due to chance.
+    /// The finding holds, but random placements or random genomes give as much.
+    #[serde(rename = "holds, but chance gives as much")]
+    HoldsAsByChance,
+    /// The tendency exists, but may be due to chance.
     #[serde(rename = "holds, not significant")]
     HoldsNotSignificantly,
     /// The finding does not hold.
@@ -37,6 +40,7 @@ impl Verdict {
     pub fn name(self) -> &'static str {
         match self {
             Self::Holds => "holds",
+            Self::HoldsAsByChance => "holds, but chance gives as much",
             Self::HoldsNotSignificantly => "holds, not significant",
             Self::Differs => "differs",
             Self::NotEnoughRuns => "not enough runs",
@@ -111,6 +115,19 @@ pub struct Finding {
 }
 
 impl Finding {
+    /// Changes the verdict of a finding that holds if chance gives as much.
+    fn as_much_by_chance(mut self, as_much: bool) -> Self {
+        if as_much
+            && matches!(
+                self.verdict,
+                Verdict::Holds | Verdict::HoldsNotSignificantly
+            )
+        {
+            self.verdict = Verdict::HoldsAsByChance;
+        }
+        self
+    }
+
     /// Replaces the result if a group has no runs.
     fn about(mut self, groups: &[&Group]) -> Self {
         if groups.iter().any(|group| group.runs.is_empty()) {
@@ -119,6 +136,27 @@ impl Finding {
         }
         self
     }
+}
+
+/// Compares the share of runs dominated by some structures with the shares that chance gives. The
+/// finding holds beyond chance if the share is significantly larger than in random placements and
+/// in the final states of random genomes.
+fn beyond_chance(mut finding: Finding, group: &Group, structures: &[Structure]) -> Finding {
+    let Some(chance) = group.chance.as_ref().filter(|_| !group.runs.is_empty()) else {
+        return finding;
+    };
+    let runs = group.runs.len() as u32;
+    let named = count(group, |run| is_named(run, structures));
+    let mut as_much = false;
+    for (kind, chance) in chance.kinds() {
+        let (draws, share) = (chance.draws() as u32, chance.named(structures));
+        let by_chance = (share * f64::from(draws)).round() as u32;
+        let test = fisher(&[named, runs - named], &[by_chance, draws - by_chance]);
+        let more = f64::from(named) / f64::from(runs) > share;
+        as_much |= !more || test.compatible();
+        finding.ours += &format!("; {:.0} % of {kind}", 100.0 * share);
+    }
+    finding.as_much_by_chance(as_much)
 }
 
 /// Looks up the groups of a finding; `None` if one is not in the plan.
@@ -229,11 +267,12 @@ pub fn all(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
 
 fn model_b(gathered: &Gathered) -> Option<Finding> {
     let [group] = groups(gathered, [("sensor-models", "B, 20x20")])?;
-    let is = |run: &GatheredRun| is_named(run, &[Structure::Line, Structure::Pair]);
+    let structures = [Structure::Line, Structure::Pair];
+    let is = |run: &GatheredRun| is_named(run, &structures);
     let named = count(group, is);
     let number = group.runs.len() as u32 - named;
     let test = fisher(&[named, number], &[group.planned as u32, 0]);
-    Some(
+    Some(beyond_chance(
         Finding {
             claim: "Sensor model B on 20 × 20 gives only lines and pairs".into(),
             detail: others(group, is),
@@ -243,7 +282,9 @@ fn model_b(gathered: &Gathered) -> Option<Finding> {
             verdict: universal(&[group], number == 0),
         }
         .about(&[group]),
-    )
+        group,
+        &structures,
+    ))
 }
 
 fn many_structures(gathered: &Gathered) -> Vec<Finding> {
@@ -255,11 +296,25 @@ fn many_structures(gathered: &Gathered) -> Vec<Finding> {
             .filter_map(|run| run.name().map(Structure::name))
             .collect();
         let enough = names.len() >= 4;
-        Some(Finding {
+        // As many draws as runs, again and again: the share of samples with four or more structures.
+        let mut as_much = false;
+        let mut by_chance = String::new();
+        for (kind, chance) in group.chance.iter().flat_map(GroupChance::kinds) {
+            let samples = chance.states.chunks_exact(group.runs.len().max(1));
+            let of = samples.len();
+            let many = samples.filter(|states| {
+                let names = states.iter().filter_map(|state| state.names.first());
+                names.map(|name| name.name()).collect::<BTreeSet<_>>().len() >= 4
+            });
+            let many = many.count();
+            as_much |= many * 20 >= of;
+            by_chance += &format!("; {many} of {of} samples of {kind} have four or more");
+        }
+        let finding = Finding {
             claim: format!("Sensor model C gives four or more structures on {grid}"),
             detail: Detail::None,
             ours: format!(
-                "{} in {}: {}",
+                "{} in {}: {}{by_chance}",
                 names.len(),
                 group.counted(),
                 names.into_iter().collect::<Vec<_>>().join(", ")
@@ -271,17 +326,18 @@ fn many_structures(gathered: &Gathered) -> Vec<Finding> {
                 (false, true) => Verdict::Differs,
                 (false, false) => Verdict::NotEnoughRuns,
             },
-        })
+        };
+        Some(finding.as_much_by_chance(as_much))
     };
     ["15x15", "20x20"].into_iter().filter_map(of_grid).collect()
 }
 
-/// Returns the finding that more than half of the runs satisfy a condition.
-fn most(group: &Group, claim: &str, what: &str, is: impl Fn(&GatheredRun) -> bool) -> Finding {
-    let named = count(group, is);
+/// Returns the finding that some structures dominate more than half of the runs.
+fn most(group: &Group, claim: &str, what: &str, structures: &[Structure]) -> Finding {
+    let named = count(group, |run| is_named(run, structures));
     let others = group.runs.len() as u32 - named;
     let test = sign(named, others);
-    Finding {
+    let finding = Finding {
         claim: claim.into(),
         detail: Detail::None,
         ours: format!("{what} in {}", of_runs(named, group)),
@@ -289,7 +345,16 @@ fn most(group: &Group, claim: &str, what: &str, is: impl Fn(&GatheredRun) -> boo
         p: Some(test.p),
         verdict: tendency(&[group], named > others, test),
     }
-    .about(&[group])
+    .about(&[group]);
+    beyond_chance(finding, group, structures)
+}
+
+/// Returns the structures that count as groupings.
+fn groupings() -> Vec<Structure> {
+    Structure::ALL
+        .into_iter()
+        .filter(|s| is_grouping(*s))
+        .collect()
 }
 
 fn densities(gathered: &Gathered) -> Vec<Finding> {
@@ -305,14 +370,17 @@ fn densities(gathered: &Gathered) -> Vec<Finding> {
         Structure::RandomDispersion,
     ];
     vec![
-        most(dense, "Grouping dominates on 15 × 15", "grouping", |run| {
-            run.name().is_some_and(is_grouping)
-        }),
+        most(
+            dense,
+            "Grouping dominates on 15 × 15",
+            "grouping",
+            &groupings(),
+        ),
         most(
             sparse,
             "Dispersion, lines and pairs dominate on 20 × 20",
             "dispersion, lines or pairs",
-            |run| is_named(run, &loose),
+            &loose,
         ),
     ]
 }
@@ -330,7 +398,7 @@ fn predefined(gathered: &Gathered) -> Vec<Finding> {
         let lines = count(group, is);
         let number = group.runs.len() as u32 - lines;
         let test = fisher(&[lines, number], &[group.planned as u32, 0]);
-        Finding {
+        let finding = Finding {
             claim: format!(
                 "Predefined lines give lines in every run on {}",
                 group.settings.scenario().grid()
@@ -341,7 +409,8 @@ fn predefined(gathered: &Gathered) -> Vec<Finding> {
             p: Some(test.p),
             verdict: universal(&[group], number == 0),
         }
-        .about(&[group])
+        .about(&[group]);
+        beyond_chance(finding, group, &[Structure::Line])
     };
     let mut findings: Vec<Finding> = [dense, sparse].iter().map(every).collect();
     let shares = [dense, sparse].map(|group| group.values(|run| run.share(Structure::Line)));
@@ -518,21 +587,22 @@ fn noise(gathered: &Gathered) -> Vec<Finding> {
     let dispersed = count(sparse, is);
     let number = sparse.runs.len() as u32 - dispersed;
     let test = fisher(&[dispersed, number], &[sparse.planned as u32, 0]);
+    let only = Finding {
+        claim: "With 15 % noise 20 × 20 gives only dispersion".into(),
+        detail: others(sparse, is),
+        ours: format!("random dispersion in {}", of_runs(dispersed, sparse)),
+        test: format!("every run; against the paper {}", test.name),
+        p: Some(test.p),
+        verdict: universal(&[sparse], number == 0),
+    }
+    .about(&[sparse]);
     vec![
-        Finding {
-            claim: "With 15 % noise 20 × 20 gives only dispersion".into(),
-            detail: others(sparse, is),
-            ours: format!("random dispersion in {}", of_runs(dispersed, sparse)),
-            test: format!("every run; against the paper {}", test.name),
-            p: Some(test.p),
-            verdict: universal(&[sparse], number == 0),
-        }
-        .about(&[sparse]),
+        beyond_chance(only, sparse, &[Structure::RandomDispersion]),
         most(
             dense,
             "With 15 % noise 15 × 15 gives mostly grouping",
             "grouping",
-            |run| run.name().is_some_and(is_grouping),
+            &groupings(),
         ),
     ]
 }

@@ -6,6 +6,9 @@ use crate::suite::plan::{Plan, PlannedExperiment, PlannedRun, PlannedSettings, R
 use crate::suite::search::{Search, look};
 use crate::suite::{Reevaluation, Resilience, Suite};
 use minimal_surprise_controller::Controller;
+use minimal_surprise_evolution::baseline::{
+    Chance, GENOMES, PLACEMENTS, ROBOTS_MAX, ceiling, constant_fitness, skill,
+};
 use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_evolution::files::FileError;
 use minimal_surprise_evolution::finished_run::FinishedRun;
@@ -63,8 +66,19 @@ impl GatheredRun {
         self.finished.best_fitness.last().copied().unwrap_or(0.0)
     }
 
-    /// Returns the structure that the run counts towards in tests; ties go to the first in the
-    /// paper's order.
+    /// Returns the skill of the fitness beyond a constant prediction; `None` if it is undefined.
+    #[must_use]
+    pub fn skill(&self) -> Option<f64> {
+        let scenario = self.finished.settings.scenario();
+        skill(
+            self.fitness(),
+            constant_fitness(scenario),
+            ceiling(scenario),
+        )
+    }
+
+    /// Returns the structure that the run counts for in tests; ties go to the first in the paper's
+    /// order.
     #[must_use]
     pub fn name(&self) -> Option<Structure> {
         self.names.first().copied()
@@ -99,6 +113,48 @@ pub struct Group {
     pub planned: usize,
     /// The finished runs, by seed.
     pub runs: Vec<GatheredRun>,
+    /// What chance gives under these settings; `None` without finished runs, for runs beyond the
+    /// plan, and for swarms of more than [`ROBOTS_MAX`] robots.
+    pub chance: Option<GroupChance>,
+}
+
+/// What chance gives under the settings of a group.
+#[derive(Clone, Debug)]
+pub struct GroupChance {
+    /// Random placements.
+    pub placements: Chance,
+    /// Random genomes.
+    pub genomes: Chance,
+}
+
+impl GroupChance {
+    /// Draws the baselines of settings. The draws do not depend on the seeds of the runs.
+    fn draw(settings: &Settings) -> Result<Option<Self>, WorldError> {
+        let scenario = settings.scenario();
+        if scenario.robots() > ROBOTS_MAX {
+            return Ok(None);
+        }
+        let seeds = SeedTree::new(0);
+        let (topology, repetitions) = (settings.topology(), settings.repetitions());
+        Ok(Some(Self {
+            placements: Chance::of_placements(
+                scenario.grid(),
+                scenario.robots(),
+                seeds,
+                PLACEMENTS,
+            )?,
+            genomes: Chance::of_genomes(topology, scenario, repetitions, seeds, GENOMES)?,
+        }))
+    }
+
+    /// Returns both kinds of draws, each with its name.
+    #[must_use]
+    pub fn kinds(&self) -> [(&'static str, &Chance); 2] {
+        [
+            ("random placements", &self.placements),
+            ("random genomes", &self.genomes),
+        ]
+    }
 }
 
 impl Group {
@@ -396,6 +452,10 @@ fn read_group(
     for planned in settings.runs() {
         runs.extend(read_run(&planned, &planned.directory(directory), damaged)?);
     }
+    let chance = match runs.is_empty() {
+        true => None,
+        false => GroupChance::draw(&settings.settings)?,
+    };
     Ok(Group {
         experiment: experiment.to_owned(),
         label: settings.label,
@@ -403,6 +463,7 @@ fn read_group(
         settings: settings.settings,
         planned: settings.number as usize,
         runs,
+        chance,
     })
 }
 
@@ -431,6 +492,7 @@ fn read_further(
                 settings: planned.settings.clone(),
                 planned: 1,
                 runs: vec![run],
+                chance: None,
             }),
         }
     }

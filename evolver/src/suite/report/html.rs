@@ -94,7 +94,7 @@ fn write_findings(page: &mut String, report: &SuiteReport) {
         let class = match finding.verdict {
             Verdict::Holds | Verdict::HoldsNotSignificantly => "good",
             Verdict::Differs => "bad",
-            Verdict::NotEnoughRuns => "open",
+            Verdict::HoldsAsByChance | Verdict::NotEnoughRuns => "open",
         };
         let p = finding.p.map_or(String::new(), |p| {
             format!("<small>{}</small>", escape(&p_value(p)))

@@ -12,7 +12,11 @@ pub(super) const VERDICTS: &str = "*Holds* and *differs* state whether the claim
                                    true of our runs. The p-value only indicates whether a \
                                    tendency may be due to chance: a tendency that is present with \
                                    p ≥ 0.05 is marked *not significant*, and a missing tendency \
-                                   counts as *differs* only with p < 0.05.";
+                                   counts as *differs* only with p < 0.05. *Chance gives as much* \
+                                   if the share of runs is not significantly larger (Fisher's \
+                                   test) than the share of random placements or of the final \
+                                   states of random genomes; for a number of structures, if at \
+                                   least 5 % of equally large samples of either have as many.";
 
 /// Returns the explanation of the numbers in a table.
 pub(super) fn reading(report: &SuiteReport, ours: &str, paper: &str) -> String {

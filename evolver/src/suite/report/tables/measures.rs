@@ -120,6 +120,7 @@ pub(super) fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) 
     let columns: Vec<(&str, Vec<Value>)> = columns
         .medians()
         .into_iter()
+        .chain([columns.skill()])
         .chain(columns.lines_around_the_torus())
         .chain(columns.sensors_predicted())
         .collect();
@@ -228,6 +229,16 @@ impl<'a> Columns<'a> {
             }
             value
         })
+    }
+
+    /// Computes the median skill of runs; empty where it is undefined.
+    fn skill(&self) -> (&'static str, Vec<Value>) {
+        const MEASURE: &str = "median skill";
+        let value = |group: &&Group| {
+            let skills: Vec<f64> = group.runs.iter().filter_map(GatheredRun::skill).collect();
+            Value::median(&self.setting(group), MEASURE, &skills, 3)
+        };
+        (MEASURE, self.groups.iter().map(value).collect())
     }
 
     fn lines_around_the_torus(&self) -> Vec<(&'static str, Vec<Value>)> {

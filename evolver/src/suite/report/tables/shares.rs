@@ -2,7 +2,7 @@
 
 use super::table::{Row, Table, Value};
 use crate::suite::report::gather::{
-    Gathered, GatheredRun, Group, NewStart, Reevaluated, structure_named,
+    Gathered, GatheredRun, Group, GroupChance, NewStart, Reevaluated, structure_named,
 };
 use crate::suite::report::numbers::plural;
 use crate::suite::report::paper::{
@@ -10,6 +10,7 @@ use crate::suite::report::paper::{
 };
 use crate::suite::report::statistics::{fisher, wilson};
 use minimal_surprise_controller::{Prediction, Template};
+use minimal_surprise_evolution::baseline::Chance;
 use minimal_surprise_evolution::statistics::mean;
 use minimal_surprise_sim::structures::{LineOrientation, Structure};
 
@@ -23,20 +24,26 @@ struct Shared<'a> {
     counted: String,
     runs: Vec<Vec<String>>,
     of: Of,
+    /// True if the groupings are one category, as in the paper's distribution.
+    together: bool,
     paper: Option<&'a Distribution>,
+}
+
+/// Returns whether the paper combines the groupings.
+fn combines(paper: Option<&Distribution>) -> bool {
+    paper.is_some_and(|d| d.percent.contains_key(GROUPING))
 }
 
 impl Shared<'_> {
     /// Returns whether the row has a category; a row has either separate groupings or a combined
     /// one.
     fn has(&self, category: &str) -> bool {
-        let together = self.paper.is_some_and(|d| d.percent.contains_key(GROUPING));
         if category == GROUPING {
-            together
+            self.together
         } else if category == DIVERSE {
             self.of == Of::NewStarts
         } else {
-            !(together && structure_named(category).is_some_and(is_grouping))
+            !(self.together && structure_named(category).is_some_and(is_grouping))
         }
     }
 }
@@ -66,13 +73,20 @@ pub(super) fn structure_tables(
             .filter(|group| source_of(group) == source);
         let shared: Vec<Shared<'_>> = repeated
             .chain(own)
-            .map(|group| Shared {
-                name: group.label.clone(),
-                setting: format!("{}: {}", group.experiment, group.label),
-                counted: group.counted(),
-                runs: structure_categories(group, of_paper(group)),
-                of: Of::Structures,
-                paper: of_paper(group),
+            .flat_map(|group| {
+                let names = group.runs.iter().map(|run| run.names.as_slice());
+                let evolved = Shared {
+                    name: group.label.clone(),
+                    setting: format!("{}: {}", group.experiment, group.label),
+                    counted: group.counted(),
+                    runs: structure_categories(names, of_paper(group)),
+                    of: Of::Structures,
+                    together: combines(of_paper(group)),
+                    paper: of_paper(group),
+                };
+                [evolved]
+                    .into_iter()
+                    .chain(by_chance(group, of_paper(group)))
             })
             .collect();
         let id = match source {
@@ -96,9 +110,30 @@ pub(super) fn structure_tables(
     tables.collect()
 }
 
-/// Returns the categories of every run; combines the groupings if the paper combines them.
-fn structure_categories(group: &Group, paper: Option<&Distribution>) -> Vec<Vec<String>> {
-    let together = paper.is_some_and(|d| d.percent.contains_key(GROUPING));
+/// Returns the rows of what chance gives under a group's settings.
+fn by_chance(group: &Group, paper: Option<&Distribution>) -> Vec<Shared<'static>> {
+    let kinds = group.chance.iter().flat_map(GroupChance::kinds);
+    let row = |(kind, chance): (&str, &Chance)| {
+        let names = chance.states.iter().map(|state| state.names.as_slice());
+        Shared {
+            name: format!("{}: {kind}", group.label),
+            setting: format!("{}: {}, {kind}", group.experiment, group.label),
+            counted: plural(chance.draws(), "draw"),
+            runs: structure_categories(names, paper),
+            of: Of::Structures,
+            together: combines(paper),
+            paper: None,
+        }
+    };
+    kinds.map(row).collect()
+}
+
+/// Returns the categories of every run or draw; combines the groupings if the paper does.
+fn structure_categories<'a>(
+    runs: impl Iterator<Item = &'a [Structure]>,
+    paper: Option<&Distribution>,
+) -> Vec<Vec<String>> {
+    let together = combines(paper);
     let name = |structure: &Structure| {
         if together && is_grouping(*structure) {
             GROUPING.to_owned()
@@ -106,14 +141,11 @@ fn structure_categories(group: &Group, paper: Option<&Distribution>) -> Vec<Vec<
             structure.name().to_owned()
         }
     };
-    group
-        .runs
-        .iter()
-        .map(|run| match run.names.as_slice() {
-            [] => vec![NONE.to_owned()],
-            names => names.iter().map(name).collect(),
-        })
-        .collect()
+    runs.map(|names| match names {
+        [] => vec![NONE.to_owned()],
+        names => names.iter().map(name).collect(),
+    })
+    .collect()
 }
 
 /// Returns the structures that occur, in the paper's order.
@@ -301,6 +333,7 @@ pub(super) fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<T
             counted: group.counted(),
             runs: group.runs.iter().map(of_run).collect(),
             of: Of::Orientation,
+            together: false,
             paper: paper.distribution(Of::Orientation, key.0, key.1),
         });
         let again = |r: &&Reevaluated| r.experiment == key.0 && r.label == key.1;
@@ -316,6 +349,7 @@ pub(super) fn orientations(gathered: &Gathered, paper: &PaperValues) -> Option<T
                 counted: group.counted(),
                 runs: orientations.into_iter().map(of_genome).collect(),
                 of: Of::NewStarts,
+                together: false,
                 paper: paper.distribution(Of::NewStarts, key.0, key.1),
             });
         }
@@ -402,6 +436,7 @@ pub(super) fn new_starts(gathered: &Gathered) -> Option<Table> {
                     .map(|start| name(&start.names))
                     .collect(),
                 of: Of::Structures,
+                together: false,
                 paper: None,
             }
         })
@@ -438,6 +473,7 @@ mod tests {
             counted: String::new(),
             runs: vec![vec!["line".to_owned()]],
             of: Of::Structures,
+            together: false,
             paper: None,
         }];
         let categories = ["line".to_owned()];
