@@ -154,7 +154,7 @@ fn beyond_chance(mut finding: Finding, group: &Group, structures: &[Structure]) 
         let test = fisher(&[named, runs - named], &[by_chance, draws - by_chance]);
         let more = f64::from(named) / f64::from(runs) > share;
         as_much |= !more || test.compatible();
-        finding.ours += &format!("; {:.0} % of {kind}", 100.0 * share);
+        finding.ours += &format!("; by chance in {:.0} % of {kind}", 100.0 * share);
     }
     finding.as_much_by_chance(as_much)
 }

@@ -2,6 +2,7 @@
 
 use super::table::{Row, Table, Value};
 use crate::suite::report::gather::{GatheredRun, Group};
+use crate::suite::report::numbers::plural;
 use crate::suite::report::paper::{
     Distribution, MeanMedian, Number, Of, PaperValues, StructureValues, is_grouping,
 };
@@ -102,7 +103,29 @@ pub(super) fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table>
                 .to_owned(),
         ],
         columns: present.iter().map(|s| s.name().to_owned()).collect(),
-        rows: rows.to_vec(),
+        rows: rows.into_iter().chain(by_chance(group, &present)).collect(),
+    })
+}
+
+/// Creates the row of the shares of robots in random placements.
+fn by_chance(group: &Group, structures: &[Structure]) -> Option<Row> {
+    const NAME: &str = "robots in the structure in random placements, %";
+    let placements = &group.chance.as_ref()?.placements;
+    let value = |&structure: &Structure| {
+        let shares = placements.sorted_shares(structure);
+        let percent: Vec<f64> = shares.iter().map(|share| 100.0 * share).collect();
+        Some(Value {
+            of: percent.len(),
+            ours: Some(mean(&percent)),
+            ours_median: Some(median(&percent)),
+            digits: 1,
+            ..Value::new(NAME, structure.name())
+        })
+    };
+    Some(Row {
+        name: NAME.to_owned(),
+        counted: plural(placements.draws(), "draw"),
+        values: structures.iter().map(value).collect(),
     })
 }
 
