@@ -2,7 +2,7 @@
 
 use super::gather::{Gathered, GatheredRun, Group, GroupChance, Resilient, regained};
 use super::paper::{PaperValues, is_grouping};
-use super::statistics::{RUNS_MIN, Test, fisher, mann_whitney, median_interval, sign};
+use super::statistics::{Interval, RUNS_MIN, Test, fisher, mann_whitney, median_interval, sign};
 use super::tables::MEDIAN_BEST_FITNESS;
 use minimal_surprise_evolution::statistics::{mean, median};
 use minimal_surprise_sim::structures::{LineOrientation, Structure};
@@ -629,17 +629,13 @@ fn fitness(gathered: &Gathered, paper: &PaperValues) -> Vec<Finding> {
                 number.value, group.experiment, group.label, number.source
             ),
             detail: Detail::None,
-            ours: interval.map_or_else(
-                || "no runs yet".to_owned(),
-                |i| {
-                    format!(
-                        "{ours:.3} ({:.3} to {:.3}), {}",
-                        i.low,
-                        i.high,
-                        group.counted()
-                    )
-                },
-            ),
+            ours: match interval {
+                _ if values.is_empty() => "no runs yet".to_owned(),
+                None => format!("{ours:.3}, {}", group.counted()),
+                Some(Interval { low, high }) => {
+                    format!("{ours:.3} ({low:.3} to {high:.3}), {}", group.counted())
+                }
+            },
             test: "distance; bootstrap 95 % interval".into(),
             p: None,
             verdict: match (near, group.is_complete() || sure) {

@@ -74,10 +74,11 @@ pub fn wilson(successes: f64, of: f64) -> Option<Interval> {
 }
 
 /// Computes the 95 % interval of a median: the 2.5 % and 97.5 % quantiles of the medians of
-/// resamples. Returns `None` if there are no values.
+/// resamples. Returns `None` for fewer than [`RUNS_MIN`] values: the interval would be the range of
+/// the values, which contains the median with less than 95 % (of five values, with 93.75 %).
 #[must_use]
 pub fn median_interval(values: &[f64]) -> Option<Interval> {
-    if values.is_empty() {
+    if values.len() < RUNS_MIN {
         return None;
     }
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
@@ -341,6 +342,6 @@ mod tests {
         // Order statistics 14 and 28 of 41, the values 13 and 27, contain the median with 97.2 %.
         assert_close(interval.low, 13.0, 1.5);
         assert_close(interval.high, 27.0, 1.5);
-        assert_eq!(median_interval(&[]), None);
+        assert_eq!(median_interval(&[0.1, 0.2, 0.3, 0.4, 0.5]), None);
     }
 }
