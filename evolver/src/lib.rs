@@ -6,6 +6,7 @@ mod output;
 pub mod bench;
 pub mod cli;
 pub mod commands;
+pub mod data;
 pub mod exit;
 pub mod hil;
 pub mod program;

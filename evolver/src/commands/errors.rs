@@ -1,5 +1,6 @@
 //! Errors of commands, divided into invalid input and failures.
 
+use crate::data::ExportError;
 use crate::exit::Exit;
 use crate::output;
 use crate::suite::report::ReportError;
@@ -106,6 +107,15 @@ pub(super) fn unusable(error: impl AboutInput) -> anyhow::Error {
 impl AboutInput for FileError {
     fn is_bad_input(&self) -> bool {
         self.is_bad_path()
+    }
+}
+
+impl AboutInput for ExportError {
+    fn is_bad_input(&self) -> bool {
+        match self {
+            Self::File(error) => error.is_bad_input() || error.is_exists(),
+            Self::World(_) | Self::Csv { .. } => false,
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 use super::errors::unusable;
 use super::new_file::write_file;
 use super::{BadInput, flag, genome_file, read_genome};
+use crate::data::{self, ExportedRun, Table};
 use crate::report::embedding::{self, c_header, intel_hex, probe_rs_line, rust_source, slot};
 use clap::{Args, ValueEnum};
 use minimal_surprise_evolution::files::Existing;
@@ -24,6 +25,17 @@ pub struct ExportArgs {
     /// The format.
     #[arg(long, value_enum)]
     format: Format,
+    /// For csv: the directory to write; must not exist.
+    #[arg(long, value_name = "DIR")]
+    to: Option<PathBuf>,
+    /// For csv: tables, as in runs,steps.
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        default_value = "runs,generations,steps"
+    )]
+    what: Vec<Table>,
     /// The file to write; must not exist [default: standard output].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -71,6 +83,8 @@ pub enum Format {
     Hex,
     /// `agent_trajectory` of the authors' program: the poses of every step.
     Trajectory,
+    /// Tables of the run as CSV files with their description, in the directory of `--to`.
+    Csv,
 }
 
 /// Exports a genome or a run.
@@ -81,6 +95,12 @@ pub enum Format {
 pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
     if arguments.name.is_some() && !matches!(arguments.format, Format::C | Format::Rust) {
         return Err(BadInput::new("--name requires --format c or --format rust").into());
+    }
+    if arguments.to.is_some() != (arguments.format == Format::Csv) {
+        return Err(BadInput::new("--to and --format csv require each other").into());
+    }
+    if let Some(to) = &arguments.to {
+        return tables(arguments, to);
     }
     let address = flag("address", &arguments.address, memory_address)?;
     // The limit leaves enough write counts for all later updates over the serial line.
@@ -111,6 +131,23 @@ pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
     if let Some(file) = file {
         tell!("{}", probe_rs_line(&file, &arguments.chip, address));
     }
+    Ok(())
+}
+
+fn tables(arguments: &ExportArgs, to: &Path) -> anyhow::Result<()> {
+    if arguments.out.is_some() {
+        return Err(BadInput::new("--out cannot be combined with --format csv; use --to").into());
+    }
+    let directory = std::path::absolute(&arguments.from)?;
+    let name = directory.file_name().unwrap_or_default();
+    let run = ExportedRun {
+        experiment: String::new(),
+        setting: String::new(),
+        id: name.to_string_lossy().into_owned(),
+        finished: FinishedRun::read_and_check(&arguments.from).map_err(unusable)?,
+    };
+    data::write(to, &arguments.what, std::iter::once(run)).map_err(unusable)?;
+    show_line!("{}", terminal_path(to));
     Ok(())
 }
 
@@ -167,7 +204,7 @@ fn genome(
             text.into_bytes()
         }
         Format::Slot => slot(container, write_count),
-        Format::Bin | Format::Trajectory => container.to_vec(),
+        Format::Bin | Format::Trajectory | Format::Csv => container.to_vec(),
     })
 }
 

@@ -1,6 +1,7 @@
 //! `evolver paper` and `evolver suite FILE`: many evolutions, on one machine or many.
 
 mod choice;
+mod export;
 mod plan;
 mod report;
 mod run;
@@ -53,6 +54,15 @@ pub enum Verb {
         /// Location of the report.
         #[command(flatten)]
         options: report::ReportOptions,
+    },
+    /// Export the finished runs as tables for other programs: CSV files with their description.
+    Export {
+        /// Which runs.
+        #[command(flatten)]
+        choice: Choice,
+        /// Where and what to export.
+        #[command(flatten)]
+        options: export::ExportOptions,
     },
     /// Submit the runs to a cluster.
     Submit {
@@ -116,6 +126,7 @@ fn act(source: &Source, verb: &Verb) -> anyhow::Result<Exit> {
     | Verb::Run { choice, .. }
     | Verb::Status(choice)
     | Verb::Report { choice, .. }
+    | Verb::Export { choice, .. }
     | Verb::Submit { choice, .. }) = verb;
     let chosen = Chosen::new(source, choice)?;
     match verb {
@@ -123,6 +134,7 @@ fn act(source: &Source, verb: &Verb) -> anyhow::Result<Exit> {
         Verb::Status(_) => status::print(&chosen),
         Verb::Report { options, .. } => report::write(&chosen, options),
         Verb::Run { options, .. } => run::run(&chosen, Share::Whole, options),
+        Verb::Export { options, .. } => export::export(&chosen, options),
         Verb::Submit { options, .. } => submit::submit(&chosen, options),
     }
 }
