@@ -154,3 +154,132 @@ fn the_chance_of_a_swarm_of_more_than_a_thousand_robots_is_not_computed() {
         "{text}"
     );
 }
+
+const SUITE: &str = r#"
+name = "two noise levels"
+
+[[experiment]]
+name = "noise"
+runs = 2
+grids = ["7x6"]
+robots = [12]
+noise = [0.0, 0.25]
+population = 4
+generations = 2
+repetitions = 2
+steps = 20
+"#;
+
+#[test]
+fn a_suite_is_exported_as_tables_that_agree_with_its_runs() {
+    let evolver = Evolver::in_empty_folder();
+    evolver.write("own.toml", SUITE.as_bytes());
+    let export = "suite own.toml export --out runs --to data --what \
+                  runs,generations,steps,robots,genomes";
+    let none = evolver.run(&words(export));
+    assert_eq!(none.code, Some(2), "no run is finished: {none:?}");
+    let run = evolver.run(&words("suite own.toml run --out runs --progress none"));
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let exported = evolver.run(&words(export));
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+
+    let data = evolver.folder().join("data");
+    let package = fs::read_to_string(data.join("datapackage.json")).unwrap();
+    let package: Value = serde_json::from_str(&package).unwrap();
+    for (resource, rows) in
+        package["resources"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .zip([4, 4 * 2, 4 * 20, 4 * 20 * 12, 4])
+    {
+        let path = data.join(resource["path"].as_str().unwrap());
+        let mut table = csv::Reader::from_path(&path).unwrap();
+        let fields = resource["schema"]["fields"].as_array().unwrap();
+        let names = fields.iter().map(|field| field["name"].as_str().unwrap());
+        assert!(
+            table.headers().unwrap().iter().eq(names),
+            "{}",
+            path.display()
+        );
+        let mut number = 0;
+        for row in table.records() {
+            let row = row.unwrap();
+            for (field, text) in fields.iter().zip(&row) {
+                let valid = match field["type"].as_str().unwrap() {
+                    _ if text.is_empty() => true,
+                    "integer" => text.parse::<i64>().is_ok(),
+                    "number" => text.parse::<f64>().is_ok(),
+                    _ => true,
+                };
+                assert!(valid, "{}: {field}: {text}", path.display());
+            }
+            number += 1;
+        }
+        assert_eq!(number, rows, "{}", path.display());
+    }
+
+    let again = evolver.run(&words(export));
+    assert_eq!(
+        again.code,
+        Some(2),
+        "a directory is never overwritten: {again:?}"
+    );
+    let unknown = evolver.run(&words(
+        "suite own.toml export --out runs --to more --what weights",
+    ));
+    assert_eq!(unknown.code, Some(2), "{unknown:?}");
+    assert!(!evolver.folder().join("more").exists());
+}
+
+#[test]
+fn one_run_is_exported_with_the_values_that_classify_prints() {
+    let evolver = Evolver::in_empty_folder();
+    let evolve = "evolve --population 4 --generations 2 --repetitions 2 --steps 20 --seed 4 \
+                  --grid 7x6 --robots 12 --noise 0.25 --out run";
+    assert_eq!(evolver.run(&words(evolve)).code, Some(0));
+    let exported = evolver.run(&words("export run --format csv --to data --what runs"));
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+    let mut table = csv::Reader::from_path(evolver.folder().join("data/runs.csv")).unwrap();
+    let names = table.headers().unwrap().clone();
+    let row = table.records().next().unwrap().unwrap();
+    let value = |name: &str| {
+        let place = names.iter().position(|column| column == name);
+        row[place.unwrap_or_else(|| panic!("no column {name}"))].to_owned()
+    };
+    let classified = json(&evolver.run(&words("classify run --json")));
+    for name in [
+        "constant_fitness",
+        "constant_fitness_of_readings",
+        "skill",
+        "model_gain",
+    ] {
+        let printed = &classified["baselines"][name];
+        let expected = printed.as_f64().map(|number| number.to_string());
+        assert_eq!(value(name), expected.unwrap_or_default(), "{name}");
+    }
+    assert_eq!(
+        value("fitness"),
+        number(&classified["measures"]["fitness"]).to_string()
+    );
+    assert_eq!(
+        (value("run"), value("grid"), value("robots")),
+        ("run".into(), "7x6".into(), "12".into())
+    );
+    assert_eq!(
+        (value("selection"), value("crossover")),
+        ("roulette".into(), "0".into())
+    );
+
+    for flags in [
+        "export run --format csv",
+        "export run --format c --to data2",
+        "export run --format csv --to data2 --out file",
+        "export run/best.genome --format csv --to data2",
+        "export run --format csv --to data",
+    ] {
+        let run = evolver.run(&words(flags));
+        assert_eq!(run.code, Some(2), "{flags}: {run:?}");
+        assert!(!evolver.folder().join("data2").exists(), "{flags}");
+    }
+}

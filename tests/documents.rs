@@ -37,3 +37,14 @@ fn the_table_of_settings_is_in_the_documents() {
         "docs/settings.md needs this table:\n{table}"
     );
 }
+
+#[test]
+fn the_tables_of_exported_data_are_in_the_documents() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/data.md");
+    let text = fs::read_to_string(&path).unwrap();
+    let tables = minimal_surprise_evolver::data::document();
+    assert!(
+        text.ends_with(&tables),
+        "docs/data.md must end with these tables:\n{tables}"
+    );
+}
