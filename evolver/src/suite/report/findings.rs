@@ -116,7 +116,7 @@ pub struct Finding {
 
 impl Finding {
     /// Changes the verdict of a finding that holds if chance gives as much.
-    fn as_much_by_chance(mut self, as_much: bool) -> Self {
+    fn or_by_chance(mut self, as_much: bool) -> Self {
         if as_much
             && matches!(
                 self.verdict,
@@ -156,7 +156,7 @@ fn beyond_chance(mut finding: Finding, group: &Group, structures: &[Structure]) 
         as_much |= !more || test.compatible();
         finding.ours += &format!("; by chance in {:.0} % of {kind}", 100.0 * share);
     }
-    finding.as_much_by_chance(as_much)
+    finding.or_by_chance(as_much)
 }
 
 /// Looks up the groups of a finding; `None` if one is not in the plan.
@@ -327,7 +327,7 @@ fn many_structures(gathered: &Gathered) -> Vec<Finding> {
                 (false, false) => Verdict::NotEnoughRuns,
             },
         };
-        Some(finding.as_much_by_chance(as_much))
+        Some(finding.or_by_chance(as_much))
     };
     ["15x15", "20x20"].into_iter().filter_map(of_grid).collect()
 }
