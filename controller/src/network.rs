@@ -425,7 +425,7 @@ mod tests {
         let shape = Shape::new(15, 14, 14, true).unwrap();
         for (level, weight) in [(1, 1), (1, -1), (-1, 1), (-1, -1)] {
             let (level, weight) = (level * 32767, weight * 32767);
-            // The thresholds make every input neuron as large as the self-loop's value.
+            // The thresholds make every input neuron's activation equal to the self-loop's value.
             let inputs = [0, -level].into_iter().cycle().take(30);
             let mut weights = inputs.chain(core::iter::repeat(weight));
             let network: PredictionNetwork = network(shape, &mut weights);

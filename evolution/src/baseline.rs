@@ -66,7 +66,7 @@ fn noise(rate: NoiseRate) -> f64 {
 /// bit is 1 in this share of all readings.
 ///
 /// # Panics
-/// If there is no sensor.
+/// If `average_readings` is empty.
 #[must_use]
 pub fn constant_fitness_of_readings(average_readings: &[f64]) -> f64 {
     assert!(!average_readings.is_empty(), "no sensor");
@@ -163,7 +163,7 @@ impl Chance {
     /// [`WorldError`] if a start does not fit the grid, which drawn starts always do.
     ///
     /// # Panics
-    /// If there is no repetition.
+    /// If `repetitions` is 0.
     pub fn of_genomes(
         topology: Topology,
         scenario: &Scenario,

@@ -32,7 +32,7 @@ impl DamagedRuns {
         self.0.extend(other.0);
     }
 
-    /// Checks whether a run is one of the damaged ones.
+    /// Returns true if the run is damaged.
     #[must_use]
     pub fn contains(&self, run: &Path) -> bool {
         self.0.contains_key(run)

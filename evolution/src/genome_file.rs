@@ -20,7 +20,7 @@ pub enum GenomeFileError {
     /// The file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The file holds no genome that this program can run.
+    /// The file does not contain a genome that this program can run.
     #[error("{}: {error}", path.display())]
     Genome {
         /// The file.

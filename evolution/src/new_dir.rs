@@ -84,8 +84,8 @@ impl NewDir {
     /// Renames the directory to its final path and keeps it locked.
     ///
     /// # Errors
-    /// [`FileError`] if the final path exists now ([`FileError::is_exists`]), or the directory
-    /// cannot be renamed; the directory is then removed.
+    /// [`FileError`] if the final path has been created in the meantime ([`FileError::is_exists`]),
+    /// or the directory cannot be renamed. In both cases, the temporary directory is removed.
     pub fn publish_locked(mut self) -> Result<Lock, FileError> {
         if let Err(error) = fs::rename(&self.part, &self.place) {
             refuse_existing(&self.place)?;

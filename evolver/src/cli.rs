@@ -59,8 +59,8 @@ enum Command {
     /// Re-evaluate a genome from new starts, optionally with different grids, noise and swarm
     /// sizes.
     Evaluate(EvaluateArgs),
-    /// Show the fitness and the structures that chance gives: a constant prediction, random
-    /// placements, random genomes.
+    /// Show the fitness and structures expected by chance: from a constant prediction, random
+    /// placements and random genomes.
     Baseline(BaselineArgs),
     /// Remove or reposition robots of a structure, and measure the swarm's recovery.
     Damage(DamageArgs),

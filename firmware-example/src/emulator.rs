@@ -16,7 +16,7 @@ pub fn succeed() -> ! {
     end(EXIT_SUCCESS)
 }
 
-/// Exits the emulator with a failure status; to be called after the error has been logged.
+/// Exits the emulator with a failure status. Call it after logging the error.
 pub fn fail() -> ! {
     end(EXIT_FAILURE)
 }

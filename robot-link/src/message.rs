@@ -205,7 +205,7 @@ pub struct Report {
     pub surprise: Surprise,
     /// Number of steps that decided to go straight.
     pub straight: u32,
-    /// Number of these steps that the guard prevented because the cell ahead was occupied.
+    /// Number of straight steps that the guard suppressed because the cell ahead was occupied.
     pub held_back: u32,
     /// Number of steps that decided to turn left.
     pub turned_left: u32,
@@ -230,7 +230,7 @@ pub struct LineCounters {
     pub malformed: u32,
     /// Number of frames with a wrong CRC.
     pub bad_crc: u32,
-    /// Number of byte sequences between two zeros that are not a frame: damaged, truncated or too
+    /// Number of byte sequences between zeros that are not valid frames: damaged, truncated or too
     /// long.
     pub no_frame: u32,
 }

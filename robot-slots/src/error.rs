@@ -1,4 +1,4 @@
-//! Errors of a slot location, a slot and an update.
+//! Errors for invalid slot locations, invalid slots and failed updates.
 
 use minimal_surprise_controller::DecodeError;
 use minimal_surprise_controller::codec::CONTAINER_BYTES_MAX;

@@ -50,7 +50,7 @@ impl Motion {
     }
 
     /// Returns the temperature T(t) = Mₓ(t) + M_y(t) of each step, with Mₓ(t) = 1/N Σₙ |xₙ(t) −
-    /// xₙ(t+1)|, in cells per step and robot, from 0 to 1. A move across the edge is one cell
+    /// xₙ(t+1)|, in cells per step per robot, from 0 to 1. A move across the edge is one cell
     /// (paper, Eqs. 2–3).
     #[must_use]
     pub fn temperature(&self) -> Vec<f64> {
@@ -67,10 +67,9 @@ impl Motion {
         self.mean_over_period(&self.moved)
     }
 
-    /// Returns the intended robot movement I = 1/(N·τ) Σₙ Σₜ aₙ(t) over the last τ steps, where
-    /// aₙ(t) = 1 for a robot that chose to go straight, blocked or not, in cells per step and
-    /// robot, from 0 to 1 (paper, Eq. 5; its a is 1 where the networks' action value is 0). I ≥ M.
-    /// τ is [`Motion::period`].
+    /// Returns the intended robot movement I = 1/(N·τ) Σₙ Σₜ aₙ(t) over the last τ steps, in cells
+    /// per step per robot, from 0 to 1 (paper, Eq. 5). aₙ(t) is 1 if robot n chose to go straight,
+    /// blocked or not; the networks' action value is then 0. I ≥ M. τ is [`Motion::period`].
     #[must_use]
     pub fn intended_movement(&self) -> f64 {
         self.mean_over_period(&self.straight)

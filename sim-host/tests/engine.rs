@@ -1,4 +1,4 @@
-//! Tests that the fast engine returns the results of the plain engine, on every path that this
+//! Tests that the fast engine returns the same results as the plain engine, on every path that this
 //! processor can run.
 
 use minimal_surprise_controller::{Controller, Genome, MutationRate, Topology};

@@ -125,7 +125,7 @@ impl<const W: usize, const E: usize> MockFlash<W, E> {
         self.cut = None;
     }
 
-    /// Flips bits, as ageing can do.
+    /// Flips bits, as can happen in ageing flash.
     pub fn damage(&mut self, at: u32, mask: u8) {
         let place = Self::place(at, 1);
         self.bytes[place] ^= mask;

@@ -66,7 +66,7 @@ impl FileError {
 pub enum Existing {
     /// Keep the existing path and report an error.
     Refuse,
-    /// Replace a file, or files with the same names in a folder.
+    /// Replace an existing file; in a folder, replace files with the same names.
     Replace,
 }
 

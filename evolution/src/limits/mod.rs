@@ -192,7 +192,8 @@ impl Needs {
         }
     }
 
-    /// Estimates the needs of the evaluation of a genome from new starts, with all outcomes kept.
+    /// Estimates the memory and disk space needed to evaluate a genome from new starts, with all
+    /// outcomes kept.
     #[must_use]
     pub fn of_starts<T>(
         scenarios: &[(Scenario, T)],

@@ -6,7 +6,7 @@
 use minimal_surprise_controller::codec::container_length;
 use minimal_surprise_controller::{EncodedGenome, Genome};
 
-/// Returns the population of an evolution on 15 × 15.
+/// Returns the population of an evolution on a 15 × 15 grid.
 #[must_use]
 pub fn c_15x15() -> Vec<Genome> {
     read(include_bytes!("populations/c-15x15.genomes"))

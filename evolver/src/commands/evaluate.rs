@@ -18,8 +18,7 @@ use std::path::{Path, PathBuf};
 /// Conditions as flags; all combinations of listed values are evaluated.
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
-    /// The genome file, or a run directory; if config.toml is in the same directory, its conditions
-    /// are the defaults.
+    /// A genome file or a run directory; the conditions in the run's config.toml are the defaults.
     genome: PathBuf,
     /// New starts per combination of conditions.
     #[arg(

@@ -149,7 +149,8 @@ impl Robot {
     /// Identifies the robot again, in a new conversation.
     ///
     /// # Errors
-    /// [`RobotError`] if the robot does not reply or rejects the request.
+    /// [`RobotError`] if the line fails, the robot does not reply, rejects the request or sends a
+    /// reply that does not match, or the user interrupts.
     pub fn identify(&mut self) -> Result<&Identity, RobotError> {
         self.line.start_over();
         self.reported = None;

@@ -58,7 +58,7 @@ impl Job<'_> {
         )
     }
 
-    /// Creates the folder of a new submission, and writes the files that the tasks need to it.
+    /// Creates the folder of a new submission, and writes to it the files that the tasks need.
     pub(super) fn write(
         &self,
         suite_text: &str,

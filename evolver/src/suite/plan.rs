@@ -246,8 +246,8 @@ impl Plan {
     /// is set.
     ///
     /// # Errors
-    /// [`PlanError`] if the experiment does not exist, or its seeds or combinations exceed the
-    /// limits.
+    /// [`PlanError`] if the experiment does not exist, its seeds or combinations exceed the limits,
+    /// or a setting is invalid.
     pub fn new(
         suite: &Suite,
         only: Option<&str>,

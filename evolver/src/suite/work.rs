@@ -64,7 +64,8 @@ impl Shard {
 /// Returns the state of a run, determined from its files.
 ///
 /// # Errors
-/// [`ReadRunError::Damaged`] if the run is marked complete but is not complete.
+/// [`ReadRunError::Damaged`] if the run is marked complete but is not complete; another
+/// [`ReadRunError`] if its files cannot be accessed.
 pub fn progress(run: &PlannedRun, suite: &Path) -> Result<Progress, ReadRunError> {
     let directory = run.directory(suite);
     Ok(if complete(&directory)?.is_some() {

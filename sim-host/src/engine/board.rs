@@ -1,5 +1,5 @@
 //! Occupancy as rows of bits, once along x and once along y, so that the window of a robot with any
-//! heading is in three neighbouring lines.
+//! heading spans three adjacent lines.
 //!
 //! If the robot faces east or north, its window is read directly: `rows` has the lines y = 0, 1, …
 //! with x increasing along them; `columns` has the lines x = W − 1, W − 2, … with y increasing

@@ -26,7 +26,7 @@ use crate::torus::{Grid, GridError, Heading, Pose};
 use crate::world::{WorldError, check_poses};
 use core::str::FromStr;
 
-/// An error in a text, with its line number.
+/// An error in an input text, with its line number.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("line {line}: {problem}")]
 pub struct ExchangeError {

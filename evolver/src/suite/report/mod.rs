@@ -94,10 +94,10 @@ pub fn may_be_written(out: &Path) -> Result<bool, FileError> {
     Ok(true)
 }
 
-/// Writes the report of gathered runs, with the data of its tables and figures as CSV. Creates the
-/// directory `out`; `called` is the command line prefix for the commands in the report. If `out`
-/// contains `looked-into.md`, its text is inserted after the differences: paragraphs, and list
-/// items with a dash.
+/// Writes the report on the gathered runs, with the data of its tables and figures as CSV. Creates
+/// the directory `out`; `called` is the command line prefix for the commands in the report. If
+/// `out` contains `looked-into.md`, its text is inserted after the differences: paragraphs, and
+/// list items with a dash.
 ///
 /// # Errors
 /// [`ReportError`] if a file cannot be written.

@@ -206,8 +206,8 @@ pub fn sign(successes: u32, failures: u32) -> Test {
     Test { name: SIGN_TEST, p }
 }
 
-/// Tests whether a median may be this value, which is known to within `rounding`: sign test,
-/// two-sided. Values within the rounding count neither as larger nor as smaller.
+/// Tests whether the median is consistent with this value, which is known to within `rounding`
+/// (two-sided sign test). Values within the rounding count neither as larger nor as smaller.
 #[must_use]
 pub fn median_is(values: &[f64], median: f64, rounding: f64) -> Test {
     let above = values.iter().filter(|&&v| v > median + rounding).count();

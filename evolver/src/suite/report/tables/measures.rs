@@ -107,7 +107,7 @@ pub(super) fn per_structure(group: &Group, paper: &PaperValues) -> Option<Table>
     })
 }
 
-/// Creates the row of the shares of robots in random placements.
+/// Creates the row with each structure's share of robots in random placements.
 fn by_chance(group: &Group, structures: &[Structure]) -> Option<Row> {
     const NAME: &str = "robots in the structure in random placements, %";
     let placements = &group.chance.as_ref()?.placements;
