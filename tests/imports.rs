@@ -81,7 +81,13 @@ fn imports(of: &[String], code: &str, modules: &BTreeSet<Vec<String>>) -> BTreeS
         }
     }
     for start in ["crate::", "super::"] {
-        let inline = code.match_indices(start).map(|(place, _)| {
+        // Not the middle of a path, and not the scope of a visibility.
+        let is_start = |place: usize| {
+            let before = &code[..place];
+            !before.ends_with("::") && !before.ends_with("pub(in ")
+        };
+        let places = code.match_indices(start).map(|(place, _)| place);
+        let inline = places.filter(|&place| is_start(place)).map(|place| {
             let rest = &code[place..];
             let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
             rest[..end.unwrap_or(rest.len())].to_owned()
