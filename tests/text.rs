@@ -187,7 +187,11 @@ fn a_shell_reads_back_a_word_of_any_bytes() {
     };
     let own = hard().map(String::into_bytes);
     let own: Vec<_> = own
-        .chain([b"\xff\xfe".to_vec(), b"a\xff'\n\n".to_vec()])
+        .chain([
+            b"\xff\xfe".to_vec(),
+            b"a\xff'\n\n".to_vec(),
+            b"-\xff-".to_vec(),
+        ])
         .collect();
     check(&own);
     proptest!(config(20), |(words in prop::collection::vec(any_bytes(), 1..50))| {

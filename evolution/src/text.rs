@@ -395,9 +395,13 @@ pub fn shell_word(word: impl AsRef<OsStr>) -> String {
 fn printf_word(word: &[u8]) -> String {
     let line_ends = word.iter().rev().take_while(|&&byte| byte == b'\n').count();
     let mut code = String::from("\"$(printf '");
+    let empty = code.len();
     for chunk in word[..word.len() - line_ends].utf8_chunks() {
         for c in chunk.valid().chars() {
-            if c.is_alphanumeric() && !is_hidden(c) || " /._-+:,@=".contains(c) {
+            // `printf` would take a first dash for a flag.
+            let is_flag = c == '-' && code.len() == empty;
+            let is_plain = c.is_alphanumeric() && !is_hidden(c) || " /._-+:,@=".contains(c);
+            if is_plain && !is_flag {
                 code.push(c);
             } else {
                 octal(&mut code, c.encode_utf8(&mut [0; 4]).as_bytes());
