@@ -174,7 +174,7 @@ fn impossible_final_states_are_refused() {
     let refused = with(&|state| state["final"][0][2] = 4.into());
     assert_refused(&refused, &["final.json", "heading 4", "line 1"]);
     let refused = with(&|state| state["final"] = serde_json::json!([]));
-    assert_refused(&refused, &["final.json", "0 final poses of 100"]);
+    assert_refused(&refused, &["final.json", "0 final poses for 100"]);
     let refused = with(&|state| state["schema_version"] = 9.into());
     assert_refused(&refused, &["final.json", "schema version 9"]);
     evolver.write("final.json", &text.as_bytes()[..700]);
