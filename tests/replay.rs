@@ -529,7 +529,7 @@ fn impossible_numbers_are_refused_in_every_file_of_a_run() {
     let time = |text: &str| format!("{{\"wall_s\":{text},\"cpu_s\":1,\"sittings\":1}}");
     let config = |from: &str, to: &str| evolver.text("run/config.toml").replace(from, to);
     let cases = [
-        ("DONE", "zzz\n".to_owned(), "64 digits"),
+        ("DONE", "zzz\n".to_owned(), "64 hexadecimal digits"),
         (
             "DONE",
             hash.replace(['0', '1'], "2"),
@@ -565,9 +565,9 @@ fn impossible_numbers_are_refused_in_every_file_of_a_run() {
         (
             "final.json",
             state("/steps_hash_v2", "\"zzz\""),
-            "64 digits",
+            "64 hexadecimal digits",
         ),
-        ("final.json", state("/hash", "\"zzz\""), "64 digits"),
+        ("final.json", state("/hash", "\"zzz\""), "64 hexadecimal digits"),
         ("time.json", time("-1"), "seconds"),
         ("time.json", time("1e300"), "seconds"),
         ("meta.json", "{}".to_owned(), "line 1"),
@@ -614,7 +614,7 @@ fn impossible_numbers_are_refused_in_every_file_of_a_run() {
     replay(&evolver, "run --what fitness --svg a.svg");
     evolver.write("run/DONE", b"zzz\n");
     let resumed = evolver.run(&["evolve", "--resume", "run"]);
-    resumed.assert_failed(&["run/DONE", "64 digits"]);
+    resumed.assert_failed(&["run/DONE", "64 hexadecimal digits"]);
 }
 
 #[test]
