@@ -567,7 +567,11 @@ fn impossible_numbers_are_refused_in_every_file_of_a_run() {
             state("/steps_hash_v2", "\"zzz\""),
             "64 hexadecimal digits",
         ),
-        ("final.json", state("/hash", "\"zzz\""), "64 hexadecimal digits"),
+        (
+            "final.json",
+            state("/hash", "\"zzz\""),
+            "64 hexadecimal digits",
+        ),
         ("time.json", time("-1"), "seconds"),
         ("time.json", time("1e300"), "seconds"),
         ("meta.json", "{}".to_owned(), "line 1"),
