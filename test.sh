@@ -141,6 +141,9 @@ say 'packages'
 cargo package --locked --workspace --exclude tests --exclude robot-support --allow-dirty --no-verify
 
 say 'tests'
+# Many tests wait for other programs, so more of them can run than there are cores.
+RUST_TEST_THREADS=${RUST_TEST_THREADS:-$((2 * $(getconf _NPROCESSORS_ONLN)))}
+export RUST_TEST_THREADS
 # shellcheck disable=SC2086 # an option and its value
 cargo test --locked --workspace --all-features --no-fail-fast -- --show-output $without_slurm
 if [ -n "${TEST_ALL:-}" ]; then

@@ -8,7 +8,8 @@ fn lines_of(example: &str) -> Vec<String> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../Cargo.toml");
     let built = CargoBuild::new()
         .manifest_path(workspace)
-        .package("minimal-surprise-evolution")
+        // As test.sh builds the workspace, so that nothing is built twice.
+        .args(["--workspace", "--all-features"])
         .example(example)
         .run()
         .unwrap_or_else(|error| panic!("{example}: {error}"));
