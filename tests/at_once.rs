@@ -45,7 +45,8 @@ enum Locks {
 
 const ALL_LOCKS: [Locks; 3] = [Locks::Working, Locks::Missing, Locks::OfOneHost];
 
-/// Overrides the C library's locks for file systems without working locks.
+/// C source of a library that overrides the lock functions, to simulate file systems without
+/// working locks.
 const OTHER_LOCKS: &str = "
 #include <errno.h>
 #include <stdio.h>

@@ -184,8 +184,8 @@ impl PlainReading<'_> {
             .collect()
     }
 
-    /// Returns a run without the outward-pointing robots at its ends; `None` if the scripts' rules
-    /// lose the line.
+    /// Returns a run without the outward-pointing robots at its ends; `None` if the line is not
+    /// recognised under the scripts' rules.
     fn dropped(&self, track: Track, first: u16, length: u16) -> Option<(u16, u16)> {
         if length == track.length {
             return Some((first, length));

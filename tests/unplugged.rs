@@ -94,9 +94,9 @@ impl SlotBytes {
 }
 
 impl Kill {
-    /// Chooses the moment of a kill. Every second kill is at a flash operation. These kills are
-    /// spread evenly over an update: over the steps of the erase and the words of the header, the
-    /// container and the commit record.
+    /// Chooses the moment of a kill. Every second kill occurs during a flash operation. These kills
+    /// are spread evenly over an update: over the steps of the erase and the words of the header,
+    /// the container and the commit record.
     fn choose(index: u32, kills: u32, container_bytes: usize) -> Self {
         if index % 2 == 1 {
             let mut rng = ChaCha8Rng::seed_from_u64(SEED + u64::from(index));
@@ -109,7 +109,7 @@ impl Kill {
                 .step_by(WORD_BYTES)
                 .map(|at| Self::Written { at })
         };
-        // After the end of the container, an erase changes no bytes.
+        // Beyond the end of the container, an erase changes no bytes.
         let steps = (CONTAINER_AT as usize + container_bytes).div_ceil(ERASE_STEP_BYTES);
         let operations: Vec<Self> = (0..steps)
             .map(|step| Self::Erased { step })

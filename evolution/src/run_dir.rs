@@ -228,10 +228,10 @@ impl RunDir {
         unfinished(path, settings, &text).map(drop)
     }
 
-    /// Delays `generations.csv` until the run is complete. Used if other processes may be executing
-    /// the same run unnoticed, because the file system has no locks: a slower process could
-    /// otherwise replace the complete table with its shorter one. All other files written before
-    /// the end are checkpoints, each of which is valid.
+    /// Delays writing `generations.csv` until the run is complete. Used if other processes may be
+    /// executing the same run unnoticed, because the file system has no locks: a slower process
+    /// could otherwise replace the complete table with its shorter one. All other files written
+    /// before the end are checkpoints, each of which is valid.
     #[must_use]
     pub fn with_table_last(mut self) -> Self {
         self.table_last = true;

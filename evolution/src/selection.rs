@@ -99,7 +99,7 @@ impl SelectParent for Parents<'_> {
 /// A wheel with one sector per slot, proportional to the slot's fitness; all equal if all are 0.
 #[derive(Clone, Debug)]
 pub struct Roulette {
-    /// Upper limits of the sectors.
+    /// Upper bounds of the sectors.
     ends: Vec<u64>,
 }
 

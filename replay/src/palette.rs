@@ -25,7 +25,7 @@ pub struct Theme {
     pub other: &'static str,
     /// Robots of no structure; drawn as outlines.
     pub outside: &'static str,
-    /// Robots by surprise, from none to most.
+    /// Robots by surprise, from none to highest.
     pub surprise: [&'static str; 4],
     /// Correct predictions.
     pub hit: &'static str,

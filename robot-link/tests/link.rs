@@ -469,7 +469,7 @@ impl Simulation {
             let arrived: Vec<u8> = self.to_host.on_the_way.drain(..).flatten().collect();
             for byte in arrived {
                 if let Some(reply) = self.client.feed(byte) {
-                    // The rest of the bytes delivered belongs to earlier requests.
+                    // The remaining bytes belong to earlier requests.
                     return check(reply);
                 }
             }

@@ -383,7 +383,7 @@ impl NeedsOfRuns {
     }
 }
 
-/// Checks that enough is available for all parts together.
+/// Checks that enough memory or disk space is available for all parts together.
 fn check(parts: &[Part], place: Place) -> Result<(), TooMuch> {
     let needed = total(parts) as u64;
     match (

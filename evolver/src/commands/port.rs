@@ -38,8 +38,8 @@ impl PortArgs {
         PortName(self.port.clone())
     }
 
-    /// Checks the flags and connects. After that, the first signal stops the work with the robot,
-    /// and the second exits immediately.
+    /// Checks the flags and connects. After that, the first signal ends the session with the robot
+    /// cleanly, and the second exits immediately.
     pub(super) fn connect(&self) -> anyhow::Result<Robot> {
         let baud = flag("baud", &self.baud, |text| count(text, 12_000_000))?;
         let wait = flag("wait", &self.wait, |text| count(text, 3600))?;

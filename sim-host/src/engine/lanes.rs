@@ -50,7 +50,7 @@ impl Lanes {
         }
     }
 
-    /// Resets a lane to a robot before its first step.
+    /// Resets a lane to the state of a robot before its first step.
     pub(super) fn restart(&mut self, lane: usize) {
         for pair in &mut self.hidden {
             pair[lane] = 0;

@@ -1,4 +1,4 @@
-//! Tests with drawn swarms. North is at the top; opposite edges are joined.
+//! Tests on swarms given as text drawings. North is at the top; opposite edges are joined.
 
 use super::*;
 use crate::drawing::{EMPTY, draw, parse};

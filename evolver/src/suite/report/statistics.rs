@@ -26,7 +26,7 @@ pub const SIGNIFICANT: f64 = 0.05;
 pub const RUNS_MIN: usize = 6;
 /// Name of the sign test.
 pub const SIGN_TEST: &str = "sign test";
-/// Relative difference below which two probabilities of tables are considered equal, because of
+/// Relative difference below which two table probabilities are considered equal, because of
 /// rounding.
 const SAME_PROBABILITY: f64 = 1e-7;
 
@@ -56,8 +56,8 @@ impl Test {
     }
 }
 
-/// Computes Wilson's 95 % interval of a share; tied runs may be fractions of successes. Returns
-/// `None` if `of` is 0.
+/// Computes Wilson's 95 % interval of a share; ties may make the number of successes fractional.
+/// Returns `None` if `of` is 0.
 #[must_use]
 pub fn wilson(successes: f64, of: f64) -> Option<Interval> {
     if of <= 0.0 {
