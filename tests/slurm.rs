@@ -458,7 +458,8 @@ fn a_real_slurm_refuses_too_many_tasks_and_reports_a_failed_one() {
     for words in ["Invalid job array", "--shards = 102", "accepts 1 to 101"] {
         assert!(refused.stderr.contains(words), "no {words:?}: {refused:?}");
     }
-    // The file appears between submission and start: otherwise, nothing would be submitted.
+    // The file is created after submission but before the start: if it existed earlier, nothing
+    // would be submitted.
     slurm.ask(&["scontrol", "update", "PartitionName=all", "State=DOWN"]);
     let job = slurm.submit(&evolver, "3");
     evolver.write("suite/runs", b"a file where the runs should be");

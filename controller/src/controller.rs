@@ -55,7 +55,7 @@ pub struct Decision {
 /// assert_eq!(decision.action, Action::Turn);
 /// controller.step(&mut second, SensorBits::NONE);
 ///
-/// // The first readings were two occupied cells, none of them predicted.
+/// // The first readings were two occupied cells, neither of them predicted.
 /// assert_eq!(first.surprise().mispredicted_bits, 2);
 /// assert_eq!(second.surprise().mispredicted_bits, 0);
 /// ```

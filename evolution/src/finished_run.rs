@@ -493,7 +493,7 @@ impl FinishedRun {
         }
         let provenance = genome.provenance();
         if provenance.generation != settings.generations() - 1 {
-            return inconsistent("best.genome is not of the last generation of config.toml");
+            return inconsistent("best.genome is not from the last generation set in config.toml");
         }
         if provenance.matched_bits > provenance.scored_bits {
             return inconsistent("best.genome has more matched bits than scored ones");

@@ -77,7 +77,7 @@ enum Command {
     /// Hardware in the loop: simulate a swarm whose robot 0 is on a serial port, and compare the
     /// result with a simulation.
     Hil(HilArgs),
-    /// Import genomes from text files that the program of the paper's authors has written.
+    /// Import genomes from text files written by the paper authors' program.
     Import(ImportArgs),
     /// Show the contents of a genome file.
     Inspect {

@@ -54,7 +54,7 @@ pub trait Handler {
     /// [`Refusal::Unsupported`] if the robot does not support the request.
     fn start(&mut self) -> Result<(), Refusal>;
 
-    /// Stops motors and control loop; has no effect on a stopped robot.
+    /// Stops the motors and the control loop; has no effect on a stopped robot.
     ///
     /// # Errors
     /// [`Refusal::Unsupported`] if the robot does not support the request.

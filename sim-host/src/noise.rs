@@ -31,7 +31,7 @@ impl NoiseRate {
     pub const NONE: Self = Self { per_65_536: 0 };
 
     /// Rounds a probability to the nearest multiple of 1/65,536; `None` if the probability is not
-    /// from 0 to 1.
+    /// between 0 and 1.
     #[must_use]
     pub fn new(probability: f64) -> Option<Self> {
         (0.0..=1.0).contains(&probability).then(|| Self {

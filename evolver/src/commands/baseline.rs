@@ -31,7 +31,7 @@ pub struct BaselineArgs {
 /// Computes and prints the baselines of a setting.
 ///
 /// # Errors
-/// [`BadInput`] if a flag is invalid or the draws do not fit the memory.
+/// [`BadInput`] if a flag is invalid or the draws do not fit in memory.
 pub fn baseline(arguments: &BaselineArgs) -> anyhow::Result<()> {
     let number = |name: &str, text: &Option<String>, default: u32| match text {
         None => Ok(default),

@@ -37,7 +37,7 @@ pub struct EvolveArgs {
     /// Resume an interrupted run, with the settings in its directory.
     #[arg(long, value_name = "DIR", conflicts_with = "config")]
     resume: Option<PathBuf>,
-    /// Display of the progress.
+    /// Progress display.
     #[arg(long, value_enum, default_value_t)]
     progress: ProgressMode,
     /// Implementation of the evaluation; the result does not depend on it.

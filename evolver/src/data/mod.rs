@@ -241,8 +241,8 @@ impl Table {
             Self::Runs => "One row per run: settings, outcomes and baselines.",
             Self::Generations => "One row per generation of a run.",
             Self::Steps => {
-                "One row per step of the final run: the best genome from the start that determined \
-                 its fitness."
+                "One row per step of the final run, in which the best genome runs again from the \
+                 start that determined its fitness."
             }
             Self::Robots => "One row per robot and step of the final run.",
             Self::Genomes => {

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// Folder of the numbered submissions, in the suite's directory.
 const JOBS: &str = "jobs";
-/// File name of the suite's copy.
+/// File name of the copy of the suite.
 const SUITE_FILE: &str = "suite.toml";
 /// File name of the program's copy.
 const PROGRAM: &str = "evolver";

@@ -10,7 +10,7 @@ use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_evolution::text::terminal_path;
 use std::path::PathBuf;
 
-/// Where and what to export.
+/// Directory and tables of the export.
 #[derive(Debug, Args)]
 pub struct ExportOptions {
     /// Directory to write; must not exist.

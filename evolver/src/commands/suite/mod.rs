@@ -57,10 +57,10 @@ pub enum Verb {
     },
     /// Export the finished runs as tables for other programs: CSV files with their description.
     Export {
-        /// Which runs.
+        /// The chosen runs.
         #[command(flatten)]
         choice: Choice,
-        /// Where and what to export.
+        /// Directory and tables of the export.
         #[command(flatten)]
         options: export::ExportOptions,
     },

@@ -30,7 +30,7 @@ pub struct RunOptions {
     /// Threads; no result depends on them [default: one per core].
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     threads: Option<String>,
-    /// Display of the progress.
+    /// Progress display.
     #[arg(long, value_enum, default_value_t)]
     progress: ProgressMode,
 }
@@ -149,8 +149,9 @@ fn finish(
     mut damaged: DamagedRuns,
 ) -> anyhow::Result<Exit> {
     let (directory, shard) = (&chosen.directory, share.shard());
-    // Number and hash come from the same reading, so that they agree. The file of hashes is written
-    // only for the whole suite: the hashes of some runs must not replace the hashes of all runs.
+    // The count and the hash come from the same read, so that they agree. The file of hashes is
+    // written only for the whole suite: the hashes of some runs must not replace the hashes of all
+    // runs.
     let is_whole = chosen.choice.is_whole();
     let mut hashes = Hashes::read(runs, directory, is_whole, &mut damaged);
     let done = hashes.done;

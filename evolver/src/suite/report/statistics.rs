@@ -220,7 +220,7 @@ pub fn median_is(values: &[f64], median: f64, rounding: f64) -> Test {
     Test { name: SIGN_TEST, p }
 }
 
-/// Tests whether one sample tends to have larger values than the other: Mann and Whitney's test,
+/// Tests whether one sample tends to have larger values than the other: the Mann–Whitney test,
 /// two-sided, normal approximation with correction for ties and continuity.
 #[must_use]
 pub fn mann_whitney(first: &[f64], second: &[f64]) -> Test {
