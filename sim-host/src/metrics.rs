@@ -114,8 +114,6 @@ pub struct Measures {
     model: SensorModel,
     poses: Vec<Pose>,
     predictions: Vec<SensorBits>,
-    /// Number of bits mispredicted in the latest step, per robot.
-    mispredicted_now: Vec<u8>,
     motion: Motion,
     /// Number of bits mispredicted, per step.
     mispredicted: Vec<u64>,
@@ -135,7 +133,6 @@ impl Measures {
             model: topology.model(),
             poses: starts.to_vec(),
             predictions: vec![topology.fixed(); starts.len()],
-            mispredicted_now: vec![0; starts.len()],
             motion: Motion::new(grid, starts.len() as u32),
             mispredicted: Vec::new(),
             mispredicted_so_far: 0,
@@ -160,18 +157,12 @@ impl Measures {
     pub fn of_trace(grid: Grid, topology: Topology, trace: &Trace) -> Self {
         let starts = trace.steps.first().map_or(&trace.final_poses, |s| &s.poses);
         let mut measures = Self::starting_from(grid, topology, starts);
-        measures.replay(trace, |_| {});
-        measures
-    }
-
-    /// Adds the steps of a trace, calling `observe` after each step.
-    fn replay(&mut self, trace: &Trace, mut observe: impl FnMut(&Self)) {
         let after = trace.steps.iter().skip(1).map(|step| &step.poses);
         let after = after.chain([&trace.final_poses]);
         for (step, poses) in trace.steps.iter().zip(after) {
-            self.take_in(poses, &step.readings, &step.decisions);
-            observe(self);
+            measures.take_in(poses, &step.readings, &step.decisions);
         }
+        measures
     }
 
     /// Adds one step: the poses after it, and its readings and decisions.
@@ -191,14 +182,8 @@ impl Measures {
         self.poses.copy_from_slice(poses);
 
         let mut mispredicted = 0;
-        for (now, (prediction, &reading)) in self
-            .mispredicted_now
-            .iter_mut()
-            .zip(self.predictions.iter().zip(readings))
-        {
-            let differing = prediction.differing(reading);
-            *now = differing as u8;
-            mispredicted += u64::from(differing);
+        for (prediction, &reading) in self.predictions.iter().zip(readings) {
+            mispredicted += u64::from(prediction.differing(reading));
             let counts = self.predicted_occupied.iter_mut();
             let counts = counts.zip(&mut self.read_occupied).enumerate();
             for (sensor, (predicted, read)) in counts {
@@ -288,15 +273,6 @@ impl Measures {
     pub fn surprise(&self) -> Vec<f64> {
         let bits = self.bits_per_step();
         self.mispredicted.iter().map(|&n| ratio(n, bits)).collect()
-    }
-
-    /// Returns the surprise of each robot in the latest step, 1/R Σᵣ |pₙʳ(t) − sₙʳ(t)|, from 0 to
-    /// 1; 0 before the first step.
-    #[must_use]
-    pub fn surprise_of_robots(&self) -> Vec<f64> {
-        let bits = self.model.sensors() as u64;
-        let now = self.mispredicted_now.iter();
-        now.map(|&n| ratio(n.into(), bits)).collect()
     }
 
     fn robots(&self) -> u64 {
@@ -416,18 +392,23 @@ mod tests {
     }
 
     #[test]
-    fn surprise_is_the_share_of_mispredicted_bits() {
-        // At t = 0: one of 8 bits for each robot; at t = 1: none for the first, one for the second.
+    fn average_reading_counts_how_often_each_sensor_read_occupied() {
         let (measures, trace) = facing_pair(Prediction::Free);
-        let grid = parse("·····\n".repeat(5).as_str()).unwrap().0;
-        let mut over_time = Vec::new();
-        Measures::starting_from(grid, topology(Prediction::Free), &trace.steps[0].poses)
-            .replay(&trace, |measures| {
-                over_time.push(measures.surprise_of_robots())
-            });
-        assert_eq!(over_time, [[0.125, 0.125], [0.0, 0.125]]);
-        assert_eq!(measures.surprise_of_robots(), [0.0, 0.125]);
-        // Swarm: 2/16, then 1/16; 1 − their mean is the fitness 29/32.
+        let readings: Vec<_> = trace.steps.iter().flat_map(|step| &step.readings).collect();
+        let expected = (0..8).map(|sensor| {
+            let read = readings.iter().filter(|reading| reading.get(sensor));
+            read.count() as f64 / readings.len() as f64
+        });
+        let expected: Vec<f64> = expected.collect();
+        assert_eq!(measures.average_reading(), expected);
+        assert!(expected.iter().any(|&read| read > 0.0) && expected.contains(&0.0));
+    }
+
+    #[test]
+    fn surprise_is_the_share_of_mispredicted_bits() {
+        // At t = 0, one of 8 bits for each robot; at t = 1, none for the first, one for the second.
+        let (measures, _) = facing_pair(Prediction::Free);
+        // 2/16, then 1/16; 1 − their mean is the fitness 29/32.
         assert_eq!(measures.surprise(), [0.125, 0.0625]);
         let mean = (0.125 + 0.0625) / 2.0;
         assert_eq!(1.0 - mean, measures.fitness());
