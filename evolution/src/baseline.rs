@@ -74,11 +74,15 @@ pub fn constant_fitness_of_readings(average_readings: &[f64]) -> f64 {
     best.sum::<f64>() / average_readings.len() as f64
 }
 
-/// Returns (F − F₀) / (1 − η − F₀): 1 for perfect prediction, 0 for no better than the constant
-/// prediction of fitness F₀, negative for worse. `None` where 1 − η exceeds F₀ by no more than
-/// [`LEAST_ROOM`], because a ratio of such small differences says nothing.
+/// Returns the skill of a fitness F, (F − F₀) / (1 − η − F₀): 1 for perfect prediction, 0 for the
+/// fitness F₀ of the constant prediction, negative below. `None` if 1 − η exceeds F₀ by no more than
+/// [`LEAST_ROOM`], because the ratio of such small differences is arbitrary.
 #[must_use]
-pub fn skill(fitness: f64, constant_fitness: f64, ceiling: f64) -> Option<f64> {
+pub fn skill(fitness: f64, scenario: &Scenario) -> Option<f64> {
+    gain(fitness, constant_fitness(scenario), ceiling(scenario))
+}
+
+fn gain(fitness: f64, constant_fitness: f64, ceiling: f64) -> Option<f64> {
     let room = ceiling - constant_fitness;
     (room > LEAST_ROOM).then(|| (fitness - constant_fitness) / room)
 }
@@ -92,10 +96,10 @@ pub struct FitnessBaselines {
     pub constant_fitness_of_readings: f64,
     /// [`ceiling`], 0 to 1.
     pub ceiling: f64,
-    /// [`skill`] beyond the constant prediction on random states.
+    /// [`skill`] of the fitness.
     pub skill: Option<f64>,
-    /// [`skill`] beyond the constant prediction on the run's own readings: what the prediction
-    /// network adds.
+    /// Like [`skill`], but beyond the constant prediction on the run's own readings: how much the
+    /// prediction network improves on it. `None` like [`skill`].
     pub model_gain: Option<f64>,
 }
 
@@ -104,15 +108,13 @@ impl FitnessBaselines {
     #[must_use]
     pub fn of_run(scenario: &Scenario, measures: &Measures) -> Self {
         let fitness = measures.fitness();
-        let constant_fitness = constant_fitness(scenario);
         let of_readings = constant_fitness_of_readings(&measures.average_reading());
-        let ceiling = ceiling(scenario);
         Self {
-            constant_fitness,
+            constant_fitness: constant_fitness(scenario),
             constant_fitness_of_readings: of_readings,
-            ceiling,
-            skill: skill(fitness, constant_fitness, ceiling),
-            model_gain: skill(fitness, of_readings, ceiling),
+            ceiling: ceiling(scenario),
+            skill: skill(fitness, scenario),
+            model_gain: gain(fitness, of_readings, ceiling(scenario)),
         }
     }
 }
@@ -154,6 +156,20 @@ impl Chance {
             states: drawn.collect::<Result<_, _>>()?,
             fitness: Vec::new(),
         })
+    }
+
+    /// Draws [`PLACEMENTS`] with seed 0, for comparison with results of any seed. Returns `None` for
+    /// more than [`ROBOTS_MAX`] robots, because the draws would take long.
+    ///
+    /// # Errors
+    /// See [`Chance::of_placements`].
+    pub fn of_default_placements(grid: Grid, robots: u32) -> Result<Option<Self>, WorldError> {
+        match robots {
+            ..=ROBOTS_MAX => {
+                Self::of_placements(grid, robots, SeedTree::new(0), PLACEMENTS).map(Some)
+            }
+            _ => Ok(None),
+        }
     }
 
     /// Draws random genomes, as a first population does, and evaluates each on `repetitions` starts
@@ -207,6 +223,14 @@ impl Chance {
             named.count() as f64 / state.names.len().max(1) as f64
         };
         self.states.iter().map(of_state).sum::<f64>() / self.draws().max(1) as f64
+    }
+
+    /// Returns the fitness of each genome, in ascending order.
+    #[must_use]
+    pub fn sorted_fitness(&self) -> Vec<f64> {
+        let mut fitness = self.fitness.clone();
+        fitness.sort_by(f64::total_cmp);
+        fitness
     }
 
     /// Returns the shares of robots in a structure, in ascending order.
@@ -288,11 +312,13 @@ mod tests {
 
     #[test]
     fn skill_is_one_at_the_ceiling_zero_at_the_constant_and_undefined_without_room() {
-        assert_eq!(skill(0.9, 0.6, 0.9), Some(1.0));
-        assert_eq!(skill(0.6, 0.6, 0.9), Some(0.0));
-        assert!(skill(0.5, 0.6, 0.9).unwrap() < 0.0);
-        assert_eq!(skill(0.5, 0.495, 0.5), None);
-        assert_eq!(skill(0.991, 0.991, 1.0), None);
+        assert_eq!(gain(0.9, 0.6, 0.9), Some(1.0));
+        assert_eq!(gain(0.6, 0.6, 0.9), Some(0.0));
+        assert!(gain(0.5, 0.6, 0.9).unwrap() < 0.0);
+        assert_eq!(gain(0.5, 0.495, 0.5), None);
+        let scenario = scenario(15, 15, 100, 0.0);
+        assert_eq!(skill(1.0, &scenario), Some(1.0));
+        assert_eq!(skill(constant_fitness(&scenario), &scenario), Some(0.0));
     }
 
     #[test]

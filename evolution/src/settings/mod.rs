@@ -6,7 +6,7 @@ mod table;
 mod values;
 
 pub use overrides::{Overrides, Place};
-pub use table::{SETTINGS, Scalar, Setting, SettingsBuilder, setting};
+pub use table::{SETTINGS, Scalar, ScalarKind, Setting, SettingsBuilder, setting};
 pub use values::{
     COUNT_MAX, DRAWN_SEED_MAX, THREADS_MAX, add_seed, count, describe, grid, model_name,
     probability, seed, seed_text,

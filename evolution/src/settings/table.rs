@@ -27,6 +27,8 @@ pub struct Setting {
     pub default: &'static str,
     /// Description of valid values.
     pub valid: &'static str,
+    /// Type of the values in files.
+    pub kind: ScalarKind,
     /// Key of the setting's list of values in a suite; empty if a suite has no such list.
     pub list: &'static str,
     meaning: &'static str,
@@ -58,6 +60,40 @@ pub enum Scalar {
     /// A number with a fraction.
     Float(f64),
 }
+
+/// Type of a [`Scalar`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ScalarKind {
+    /// [`Scalar::Text`].
+    Text,
+    /// [`Scalar::Integer`].
+    Integer,
+    /// [`Scalar::Float`].
+    Float,
+}
+
+/// A type of setting, with the type of its values in files.
+trait Value {
+    const KIND: ScalarKind = ScalarKind::Text;
+}
+
+impl Value for u32 {
+    const KIND: ScalarKind = ScalarKind::Integer;
+}
+
+impl Value for u64 {
+    const KIND: ScalarKind = ScalarKind::Integer;
+}
+
+impl Value for f64 {
+    const KIND: ScalarKind = ScalarKind::Float;
+}
+
+impl Value for Grid {}
+impl Value for PathBuf {}
+impl Value for Selection {}
+impl Value for SensorModel {}
+impl Value for Template {}
 
 impl Serialize for Scalar {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -164,6 +200,7 @@ macro_rules! settings {
                 is_path: matches!($value_name.as_bytes(), b"GENOME" | b"DIR"),
                 default: $default,
                 valid: $valid,
+                kind: <$given as Value>::KIND,
                 list: $list,
                 meaning: concat!($($meaning),+),
                 set: |values, text| {

@@ -3,13 +3,13 @@
 use super::BadInput;
 use super::errors::unusable;
 use crate::report::structures::{self, Classified};
-use minimal_surprise_evolution::baseline::{Chance, FitnessBaselines, PLACEMENTS, ROBOTS_MAX};
+use minimal_surprise_evolution::baseline::{Chance, FitnessBaselines};
 use minimal_surprise_evolution::files::{self, DATA_BYTES_MAX};
 use minimal_surprise_evolution::finished_run::{FinishedRun, parse_final_state};
 use minimal_surprise_evolution::text::{self, TextError};
 use minimal_surprise_sim::exchange::Trajectory;
 use minimal_surprise_sim::structures::classify as find_structures;
-use minimal_surprise_sim::{Grid, Pose, SeedTree, drawing};
+use minimal_surprise_sim::{Grid, Pose, drawing};
 use std::path::Path;
 
 /// Classifies a run directory, a `final.json`, an `agent_trajectory`, or a drawing.
@@ -30,16 +30,7 @@ pub fn classify(path: &Path, json: bool) -> anyhow::Result<()> {
     };
     let found = find_structures(grid, &poses)
         .map_err(|error| BadInput::new(format!("{}: {error}", path.display())))?;
-    let robots = poses.len() as u32;
-    let chance = match robots {
-        1..=ROBOTS_MAX => Some(Chance::of_placements(
-            grid,
-            robots,
-            SeedTree::new(0),
-            PLACEMENTS,
-        )?),
-        _ => None,
-    };
+    let chance = Chance::of_default_placements(grid, poses.len() as u32)?;
     let classified = Classified {
         grid,
         poses: &poses,

@@ -9,12 +9,14 @@ use clap::ValueEnum;
 use minimal_surprise_evolution::files::{self, FileError};
 use minimal_surprise_evolution::finished_run::FinishedRun;
 use minimal_surprise_evolution::new_dir::NewDir;
+use minimal_surprise_evolution::settings::{Scalar, ScalarKind};
 use minimal_surprise_sim::WorldError;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
+use tables::weights_max;
 
 /// File name of the description.
 const PACKAGE: &str = "datapackage.json";
@@ -34,93 +36,29 @@ pub enum Table {
     Genomes,
 }
 
-/// Type of a column's values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// A whole number.
-    Integer,
-    /// A number; the text is the shortest that gives the same 64-bit number.
-    Number,
-    /// Text.
-    String,
-}
-
-impl Kind {
-    /// Returns the type's name in Frictionless Data.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Integer => "integer",
-            Self::Number => "number",
-            Self::String => "string",
-        }
-    }
-}
-
 /// A column of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
     /// Name in the header.
     pub name: String,
     /// Type.
-    pub kind: Kind,
+    pub kind: ScalarKind,
     /// Unit; empty for numbers without a unit and for text.
     pub unit: &'static str,
     /// Meaning.
     pub meaning: String,
 }
 
-/// A value of a row.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Cell {
-    /// A whole number.
-    Integer(u64),
-    /// A number.
-    Number(f64),
-    /// Text.
-    Text(String),
-    /// No value.
-    Missing,
-}
+/// A value of a row; `None` if it is missing. A number is printed as the shortest text that gives
+/// the same 64-bit number.
+pub type Cell = Option<Scalar>;
 
-impl Cell {
-    fn text(&self) -> String {
-        match self {
-            Self::Integer(value) => value.to_string(),
-            Self::Number(value) => value.to_string(),
-            Self::Text(text) => text.clone(),
-            Self::Missing => String::new(),
-        }
-    }
-}
-
-impl<T: Into<Cell>> From<Option<T>> for Cell {
-    fn from(value: Option<T>) -> Self {
-        value.map_or(Self::Missing, Into::into)
-    }
-}
-
-impl From<f64> for Cell {
-    fn from(value: f64) -> Self {
-        Self::Number(value)
-    }
-}
-
-impl From<u64> for Cell {
-    fn from(value: u64) -> Self {
-        Self::Integer(value)
-    }
-}
-
-impl From<u32> for Cell {
-    fn from(value: u32) -> Self {
-        Self::Integer(value.into())
-    }
-}
-
-impl From<&str> for Cell {
-    fn from(value: &str) -> Self {
-        Self::Text(value.to_owned())
+/// Returns a type's name in Frictionless Data.
+fn name_of(kind: ScalarKind) -> &'static str {
+    match kind {
+        ScalarKind::Text => "string",
+        ScalarKind::Integer => "integer",
+        ScalarKind::Float => "number",
     }
 }
 
@@ -161,51 +99,54 @@ pub enum ExportError {
 /// when it is complete.
 ///
 /// # Errors
-/// [`ExportError`] if the directory exists or a file cannot be written.
+/// [`ExportError`] if the directory exists, a file cannot be written or a run cannot be repeated.
 pub fn write(
     to: &Path,
     tables: &[Table],
     runs: impl Iterator<Item = ExportedRun>,
 ) -> Result<(), ExportError> {
+    let tables: BTreeSet<Table> = tables.iter().copied().collect();
     let new = NewDir::beside(to)?;
-    let weights = tables::WEIGHTS_MAX;
     let mut writers = Vec::new();
-    for &table in tables {
+    for &table in &tables {
         let path = new.path().join(table.file_name());
         let file = File::create(&path).map_err(FileError::at(&path))?;
-        let mut csv = csv::Writer::from_writer(BufWriter::new(file));
-        let names = table.columns(weights);
-        let names = names.iter().map(|column| &column.name);
-        csv.write_record(names).map_err(table.failed())?;
-        writers.push((table, csv));
+        writers.push(table.writer(BufWriter::new(file))?);
     }
     // Experiments may share runs; only the table of runs has a row for each.
     let mut seen = BTreeSet::new();
     for run in runs {
         let is_new = seen.insert(run.id.clone());
-        for (table, csv) in &mut writers {
-            if !is_new && *table != Table::Runs {
-                continue;
-            }
-            for row in table.rows(&run, weights)? {
-                let row = row.iter().map(Cell::text);
-                csv.write_record(row).map_err(table.failed())?;
+        for (table, csv) in tables.iter().zip(&mut writers) {
+            if is_new || *table == Table::Runs {
+                table.write_run(&run, csv)?;
             }
         }
     }
-    for (table, csv) in writers {
+    for (table, csv) in tables.iter().zip(writers) {
         let path = new.path().join(table.file_name());
         let file = csv.into_inner();
-        let file = file.map_err(|error| FileError::at(&path)(error.into_error()))?;
-        let mut file = file
-            .into_inner()
-            .map_err(|error| FileError::at(&path)(error.into_error()))?;
+        let mut file = file.map_err(|error| FileError::at(&path)(error.into_error()))?;
         file.flush().map_err(FileError::at(&path))?;
     }
-    let package = format!("{:#}\n", package(tables, weights));
+    let package = format!("{:#}\n", package(&tables));
     files::create(&new.path().join(PACKAGE), package.as_bytes())?;
     new.publish()?;
     Ok(())
+}
+
+/// Returns the table of runs as CSV.
+///
+/// # Errors
+/// [`ExportError`] if a run cannot be repeated.
+pub fn runs_text(runs: impl Iterator<Item = ExportedRun>) -> Result<String, ExportError> {
+    let mut csv = Table::Runs.writer(Vec::new())?;
+    for run in runs {
+        Table::Runs.write_run(&run, &mut csv)?;
+    }
+    let bytes = csv.into_inner();
+    let bytes = bytes.expect("flushing a buffer in memory cannot fail");
+    Ok(String::from_utf8(bytes).expect("text stays text"))
 }
 
 impl Table {
@@ -252,6 +193,32 @@ impl Table {
         }
     }
 
+    /// Creates a table that has only its header.
+    fn writer<W: Write>(self, to: W) -> Result<csv::Writer<W>, ExportError> {
+        let mut csv = csv::Writer::from_writer(to);
+        let columns = self.columns(weights_max());
+        let names = columns.iter().map(|column| &column.name);
+        csv.write_record(names).map_err(self.failed())?;
+        Ok(csv)
+    }
+
+    /// Adds the rows of a run.
+    fn write_run<W: Write>(
+        self,
+        run: &ExportedRun,
+        csv: &mut csv::Writer<W>,
+    ) -> Result<(), ExportError> {
+        let mut written = Ok(());
+        self.rows(run, &mut |row| {
+            if written.is_ok() {
+                let row = row.into_iter();
+                let row = row.map(|cell| cell.map_or_else(String::new, |cell| cell.to_string()));
+                written = csv.write_record(row);
+            }
+        })?;
+        written.map_err(self.failed())
+    }
+
     fn failed(self) -> impl FnOnce(csv::Error) -> ExportError {
         let table = self.file_name();
         move |source| ExportError::Csv { table, source }
@@ -259,12 +226,12 @@ impl Table {
 }
 
 /// Describes tables as a Frictionless data package.
-fn package(tables: &[Table], weights: usize) -> Value {
+fn package(tables: &BTreeSet<Table>) -> Value {
     let resources = tables.iter().map(|table| {
-        let fields = table.columns(weights).into_iter().map(|column| {
+        let fields = table.columns(weights_max()).into_iter().map(|column| {
             let mut field = json!({
                 "name": column.name,
-                "type": column.kind.name(),
+                "type": name_of(column.kind),
                 "description": column.meaning,
             });
             if !column.unit.is_empty() {
@@ -312,7 +279,7 @@ pub fn document() -> String {
             text += &format!(
                 "| `{}` | {} | {unit} | {} |\n",
                 column.name,
-                column.kind.name(),
+                name_of(column.kind),
                 column.meaning
             );
         }

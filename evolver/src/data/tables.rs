@@ -1,18 +1,28 @@
 //! The columns and rows of each table.
 
-use super::{Cell, Column, ExportError, ExportedRun, Kind, Table};
-use Kind::{Integer, Number, String as Text};
-use minimal_surprise_controller::{Action, Turn};
+use super::{Cell, Column, ExportedRun, Table};
+use ScalarKind::{Float, Integer, Text};
+use minimal_surprise_controller::{Action, Prediction, SensorModel, Topology, Turn};
 use minimal_surprise_evolution::baseline::FitnessBaselines;
-use minimal_surprise_evolution::settings::{SETTINGS, Scalar, Setting};
+use minimal_surprise_evolution::settings::{SETTINGS, Scalar, ScalarKind, Setting};
+use minimal_surprise_sim::WorldError;
 use minimal_surprise_sim::structures::{Structure, classify};
 
-/// Number of weights of the largest genome: sensor model C without fixed predictions.
-pub(super) const WEIGHTS_MAX: usize = 166 + 450;
+/// Returns the number of weights of the largest genome.
+pub(super) fn weights_max() -> usize {
+    let free = SensorModel::ALL.map(|model| Topology::new(model, Prediction::Free));
+    let weights = free.into_iter().flatten().map(Topology::weights);
+    weights.max().unwrap_or(0)
+}
 
-type Row = Vec<Cell>;
+/// The values of a row, in the order of the columns.
+pub(super) type Row = Vec<Cell>;
 
-fn column(name: &str, kind: Kind, unit: &'static str, meaning: &str) -> Column {
+fn cell(value: impl Into<Scalar>) -> Cell {
+    Some(value.into())
+}
+
+fn column(name: &str, kind: ScalarKind, unit: &'static str, meaning: &str) -> Column {
     Column {
         name: name.to_owned(),
         kind,
@@ -29,19 +39,10 @@ fn settings() -> impl Iterator<Item = &'static Setting> {
         .filter(move |setting| !is_result_independent(setting.name))
 }
 
-/// Returns the type of a setting's values.
-fn kind_of(setting: &str) -> Kind {
-    match setting {
-        "robots" | "population" | "generations" | "repetitions" | "steps" | "seed" => Integer,
-        "noise" | "mutation" | "crossover" => Number,
-        _ => Text,
-    }
-}
-
 fn column_of_structure(structure: Structure) -> Column {
     Column {
         name: format!("share_{}", structure.name().replace(' ', "_")),
-        kind: Number,
+        kind: Float,
         unit: "share of robots",
         meaning: format!("robots in the structure *{}*, 0 to 1", structure.name()),
     }
@@ -59,7 +60,7 @@ impl Table {
                 column("generation", Integer, "", "generation, from 0"),
                 column(
                     "best_fitness",
-                    Number,
+                    Float,
                     "share of bits",
                     "fitness of the best genome, 0 to 1",
                 ),
@@ -75,13 +76,13 @@ impl Table {
                     ),
                     column(
                         "temperature",
-                        Number,
+                        Float,
                         "cells/step/robot",
                         "share of robots that move in the step, 0 to 1",
                     ),
                     column(
                         "surprise",
-                        Number,
+                        Float,
                         "share of bits",
                         "sensor bits mispredicted in the step, 0 to 1",
                     ),
@@ -140,35 +141,38 @@ impl Table {
         }
     }
 
-    /// Returns the rows of a run.
+    /// Passes the rows of a run to `add`, one at a time: a run may have too many for the memory.
     ///
     /// # Errors
-    /// [`ExportError`] if the run cannot be repeated.
-    pub(super) fn rows(self, run: &ExportedRun, weights: usize) -> Result<Vec<Row>, ExportError> {
+    /// [`WorldError`] if the run cannot be repeated.
+    pub(super) fn rows(
+        self,
+        run: &ExportedRun,
+        add: &mut dyn FnMut(Row),
+    ) -> Result<(), WorldError> {
         match self {
-            Self::Runs => Ok(vec![runs_row(run)?]),
+            Self::Runs => add(runs_row(run)?),
             Self::Generations => {
-                let fitness = run.finished.best_fitness.iter().enumerate();
-                let rows = fitness.map(|(generation, &best)| {
-                    vec![id(run), (generation as u64).into(), best.into()]
-                });
-                Ok(rows.collect())
+                for (generation, &best) in run.finished.best_fitness.iter().enumerate() {
+                    add(vec![id(run), cell(generation as u64), cell(best)]);
+                }
             }
-            Self::Steps => steps_rows(run),
-            Self::Robots => robots_rows(run),
+            Self::Steps => steps_rows(run, add)?,
+            Self::Robots => robots_rows(run, add)?,
             Self::Genomes => {
-                let genome = run.finished.genome.weights().iter();
+                let weights = run.finished.genome.weights().iter();
                 let mut row = vec![id(run)];
-                row.extend(genome.map(|&weight| Cell::Text(weight.to_string())));
-                row.resize(1 + weights, Cell::Missing);
-                Ok(vec![row])
+                row.extend(weights.map(|&weight| cell(weight.to_string())));
+                row.resize(1 + weights_max(), None);
+                add(row);
             }
         }
+        Ok(())
     }
 }
 
 fn id(run: &ExportedRun) -> Cell {
-    run.id.as_str().into()
+    cell(run.id.as_str())
 }
 
 fn runs_columns() -> Vec<Column> {
@@ -195,50 +199,50 @@ fn runs_columns() -> Vec<Column> {
     columns.extend(settings().map(|setting| {
         let name = setting.name.replace('-', "_");
         let meaning = format!("setting: {}", setting.meaning());
-        column(&name, kind_of(setting.name), "", &meaning)
+        column(&name, setting.kind, "", &meaning)
     }));
     columns.extend([
         column("width", Integer, "cells", "width of the grid"),
         column("height", Integer, "cells", "height of the grid"),
         column(
             "density",
-            Number,
+            Float,
             "robots/cell",
             "swarm size divided by the number of cells",
         ),
         column(
             "fitness",
-            Number,
+            Float,
             "share of bits",
             "fitness of the best genome, 0 to 1",
         ),
         column(
             "constant_fitness",
-            Number,
+            Float,
             "share of bits",
             "fitness F₀ of the best constant prediction on random states",
         ),
         column(
             "constant_fitness_of_readings",
-            Number,
+            Float,
             "share of bits",
             "fitness F₁ of the best constant prediction on the final run's readings",
         ),
         column(
             "ceiling",
-            Number,
+            Float,
             "share of bits",
             "highest possible fitness with this noise",
         ),
         column(
             "skill",
-            Number,
+            Float,
             "",
             "(fitness − F₀) / (ceiling − F₀); empty if undefined",
         ),
         column(
             "model_gain",
-            Number,
+            Float,
             "",
             "(fitness − F₁) / (ceiling − F₁); empty if undefined",
         ),
@@ -251,22 +255,22 @@ fn runs_columns() -> Vec<Column> {
     ]);
     columns.extend(Structure::ALL.map(column_of_structure));
     columns.extend([
-        column("movement", Number, "cells/step/robot", "movement M, 0 to 1"),
+        column("movement", Float, "cells/step/robot", "movement M, 0 to 1"),
         column(
             "intended_movement",
-            Number,
+            Float,
             "1/step/robot",
             "intended movement I, 0 to 1",
         ),
         column(
             "last_temperature",
-            Number,
+            Float,
             "cells/step/robot",
             "temperature in the last step, 0 to 1",
         ),
         column(
             "mean_surprise",
-            Number,
+            Float,
             "share of bits",
             "mean surprise of the final run, 0 to 1",
         ),
@@ -300,7 +304,7 @@ fn runs_columns() -> Vec<Column> {
     columns
 }
 
-fn runs_row(run: &ExportedRun) -> Result<Row, ExportError> {
+fn runs_row(run: &ExportedRun) -> Result<Row, WorldError> {
     let finished = &run.finished;
     let scenario = finished.settings.scenario();
     let grid = scenario.grid();
@@ -309,133 +313,97 @@ fn runs_row(run: &ExportedRun) -> Result<Row, ExportError> {
     let found = classify(grid, &finished.final_poses)?;
     let names: Vec<&str> = found.names().iter().map(|name| name.name()).collect();
     let lines = found.line_counts();
-    let mut row: Row = vec![
-        run.experiment.as_str().into(),
-        run.setting.as_str().into(),
+    let mut row = vec![
+        cell(run.experiment.as_str()),
+        cell(run.setting.as_str()),
         id(run),
     ];
-    row.extend(
-        settings().map(|setting| match finished.settings.value(setting.name) {
-            // A setting that is not written has its default.
-            None if setting.default.is_empty() => Cell::Missing,
-            None => setting.default.into(),
-            Some(Scalar::Text(text)) => Cell::Text(text),
-            Some(Scalar::Integer(value)) => Cell::Integer(value),
-            Some(Scalar::Float(value)) => Cell::Number(value),
-        }),
-    );
+    row.extend(settings().map(|setting| {
+        // A setting that is not written has its default.
+        let default = || (!setting.default.is_empty()).then(|| setting.default.into());
+        finished.settings.value(setting.name).or_else(default)
+    }));
     row.extend([
-        u32::from(grid.width()).into(),
-        u32::from(grid.height()).into(),
-        (f64::from(scenario.robots()) / f64::from(grid.cells())).into(),
-        measures.fitness().into(),
-        baselines.constant_fitness.into(),
-        baselines.constant_fitness_of_readings.into(),
-        baselines.ceiling.into(),
-        baselines.skill.into(),
-        baselines.model_gain.into(),
-        Cell::Text(names.join(";")),
+        cell(u32::from(grid.width())),
+        cell(u32::from(grid.height())),
+        cell(f64::from(scenario.robots()) / f64::from(grid.cells())),
+        cell(measures.fitness()),
+        cell(baselines.constant_fitness),
+        cell(baselines.constant_fitness_of_readings),
+        cell(baselines.ceiling),
+        baselines.skill.map(Scalar::from),
+        baselines.model_gain.map(Scalar::from),
+        cell(names.join(";")),
     ]);
-    row.extend(Structure::ALL.map(|structure| Cell::Number(found.share(structure))));
+    row.extend(Structure::ALL.map(|structure| cell(found.share(structure))));
     row.extend([
-        measures.movement().into(),
-        measures.intended_movement().into(),
-        measures.temperature().last().copied().into(),
-        (1.0 - measures.fitness()).into(),
-        lines.horizontal.into(),
-        lines.vertical.into(),
-        lines.spanning.into(),
+        cell(measures.movement()),
+        cell(measures.intended_movement()),
+        measures.temperature().last().copied().map(Scalar::from),
+        cell(1.0 - measures.fitness()),
+        cell(lines.horizontal),
+        cell(lines.vertical),
+        cell(lines.spanning),
         lines
             .orientation()
-            .map(|orientation| orientation.name())
-            .into(),
-        finished.hash.as_str().into(),
-        finished.program.as_str().into(),
+            .map(|orientation| orientation.name().into()),
+        cell(finished.hash.as_str()),
+        cell(finished.program.as_str()),
     ]);
     Ok(row)
 }
 
-fn steps_rows(run: &ExportedRun) -> Result<Vec<Row>, ExportError> {
+fn steps_rows(run: &ExportedRun, add: &mut dyn FnMut(Row)) -> Result<(), WorldError> {
     let grid = run.finished.settings.scenario().grid();
     let measures = run.finished.measures()?;
     let (temperature, surprise) = (measures.temperature(), measures.surprise());
-    let mut states = vec![run.finished.starts.clone()];
-    run.finished
-        .replay(|world| states.push(world.poses().to_vec()))?;
-    let steps = states
-        .iter()
-        .zip(temperature.iter().zip(&surprise))
-        .enumerate();
-    steps
-        .map(|(step, (poses, (&temperature, &surprise)))| {
-            let found = classify(grid, poses)?;
-            let mut row = vec![
-                id(run),
-                (step as u64).into(),
-                temperature.into(),
-                surprise.into(),
-            ];
-            row.extend(Structure::ALL.map(|structure| Cell::Number(found.share(structure))));
-            Ok(row)
-        })
-        .collect()
+    let mut poses = run.finished.starts.clone();
+    let mut step = 0;
+    let mut added = Ok(());
+    run.finished.replay(|world| {
+        match classify(grid, &poses) {
+            Ok(found) => {
+                let mut row = vec![
+                    id(run),
+                    cell(step as u64),
+                    cell(temperature[step]),
+                    cell(surprise[step]),
+                ];
+                row.extend(Structure::ALL.map(|structure| cell(found.share(structure))));
+                add(row);
+            }
+            Err(error) => added = Err(error),
+        }
+        poses.copy_from_slice(world.poses());
+        step += 1;
+    })?;
+    added
 }
 
-fn robots_rows(run: &ExportedRun) -> Result<Vec<Row>, ExportError> {
-    let trace = run.finished.trace()?;
-    let mut rows = Vec::new();
-    for (step, of_step) in trace.steps.iter().enumerate() {
-        let robots = of_step
-            .poses
-            .iter()
-            .zip(&of_step.readings)
-            .zip(&of_step.decisions);
+fn robots_rows(run: &ExportedRun, add: &mut dyn FnMut(Row)) -> Result<(), WorldError> {
+    let mut poses = run.finished.starts.clone();
+    let mut step = 0_u64;
+    run.finished.replay(|world| {
+        let robots = poses.iter().zip(world.readings()).zip(world.decisions());
         for (robot, ((pose, reading), decision)) in robots.enumerate() {
             let action = match (decision.action, decision.turn) {
                 (Action::Straight, _) => "straight",
                 (Action::Turn, Turn::CounterClockwise) => "left",
                 (Action::Turn, Turn::Clockwise) => "right",
             };
-            rows.push(vec![
+            add(vec![
                 id(run),
-                (step as u64).into(),
-                (robot as u64).into(),
-                u32::from(pose.x).into(),
-                u32::from(pose.y).into(),
-                (pose.heading as u32).into(),
-                action.into(),
-                u32::from(reading.bits()).into(),
-                u32::from(decision.prediction.bits()).into(),
+                cell(step),
+                cell(robot as u64),
+                cell(u32::from(pose.x)),
+                cell(u32::from(pose.y)),
+                cell(pose.heading as u32),
+                cell(action),
+                cell(u32::from(reading.bits())),
+                cell(u32::from(decision.prediction.bits())),
             ]);
         }
-    }
-    Ok(rows)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use minimal_surprise_controller::{Prediction, SensorModel, Topology};
-    use minimal_surprise_evolution::settings::Settings;
-
-    #[test]
-    fn the_type_of_each_setting_is_that_of_its_default_value() {
-        let defaults = Settings::builder().build().unwrap();
-        for setting in settings() {
-            let kind = match defaults.value(setting.name) {
-                None => continue,
-                Some(Scalar::Text(_)) => Text,
-                Some(Scalar::Integer(_)) => Integer,
-                Some(Scalar::Float(_)) => Number,
-            };
-            assert_eq!(kind_of(setting.name), kind, "{}", setting.name);
-        }
-    }
-
-    #[test]
-    fn the_columns_of_weights_are_enough_for_every_topology() {
-        let largest =
-            SensorModel::ALL.map(|model| Topology::new(model, Prediction::Free).unwrap().weights());
-        assert_eq!(largest.into_iter().max(), Some(WEIGHTS_MAX));
-    }
+        poses.copy_from_slice(world.poses());
+        step += 1;
+    })
 }

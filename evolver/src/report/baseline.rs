@@ -49,8 +49,7 @@ pub fn text(baselines: &Baselines<'_>) -> String {
         }
         table.add_row(row);
     }
-    let mut fitness = genomes.fitness.clone();
-    fitness.sort_by(f64::total_cmp);
+    let fitness = genomes.sorted_fitness();
     format!(
         "{} on {}, {} robots, {} steps, noise {}; seed {}\n\n\
          constant prediction on random states  {:.4}\n\
@@ -88,8 +87,7 @@ pub fn json(baselines: &Baselines<'_>) -> Value {
         genomes,
     } = *baselines;
     let scenario = settings.scenario();
-    let mut fitness = genomes.fitness.clone();
-    fitness.sort_by(f64::total_cmp);
+    let fitness = genomes.sorted_fitness();
     let mut object = json!({
         "schema_version": SCHEMA_VERSION,
         "topology": describe(settings.topology()),

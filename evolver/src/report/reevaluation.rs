@@ -23,9 +23,7 @@ pub struct Condition {
 impl Condition {
     /// Returns the skill of the mean fitness.
     fn skill(&self) -> Option<f64> {
-        let fitness = mean(&fitnesses(&self.reruns));
-        let constant = constant_fitness(&self.scenario);
-        skill(fitness, constant, ceiling(&self.scenario))
+        skill(mean(&fitnesses(&self.reruns)), &self.scenario)
     }
 }
 

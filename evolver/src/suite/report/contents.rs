@@ -6,6 +6,7 @@ use super::gather::{Gathered, GatheredRun, Group};
 use super::numbers::{p_value, plural};
 use super::paper::PaperValues;
 use super::tables::{self, Table, Value};
+use crate::data::ExportedRun;
 use crate::report::progress::seconds;
 use crate::suite::Suite;
 use minimal_surprise_evolution::text::{hex, markdown, new_file_name, shell_word};
@@ -326,49 +327,17 @@ fn made_again(gathered: &Gathered, called: &str) -> Vec<ProvenanceRow> {
     makings
 }
 
-/// A row of `runs.csv`.
-#[derive(Serialize)]
-pub(super) struct RunRow<'a> {
-    experiment: &'a str,
-    setting: String,
-    id: &'a str,
-    seed: u64,
-    structures: String,
-    share: f64,
-    fitness: f64,
-    movement: f64,
-    intended_movement: f64,
-    horizontal_lines: u32,
-    vertical_lines: u32,
-    spanning_lines: u32,
-    hash: &'a str,
-    program: &'a str,
-}
-
-pub(super) fn run_rows(gathered: &Gathered) -> Vec<RunRow<'_>> {
-    let mut rows = Vec::new();
-    for group in gathered.groups.iter().chain(&gathered.further) {
-        for run in &group.runs {
-            let names: Vec<&str> = run.names.iter().map(|name| name.name()).collect();
-            rows.push(RunRow {
-                experiment: &group.experiment,
-                setting: group.setting(),
-                id: &run.id,
-                seed: run.finished.settings.seed(),
-                structures: names.join(";"),
-                share: run.named_share(),
-                fitness: run.fitness(),
-                movement: run.finished.movement,
-                intended_movement: run.finished.intended_movement,
-                horizontal_lines: run.lines.horizontal,
-                vertical_lines: run.lines.vertical,
-                spanning_lines: run.lines.spanning,
-                hash: &run.finished.hash,
-                program: &run.finished.program,
-            });
-        }
-    }
-    rows
+/// Returns the runs for the table of runs.
+pub(super) fn exported(gathered: &Gathered) -> impl Iterator<Item = ExportedRun> {
+    let groups = gathered.groups.iter().chain(&gathered.further);
+    groups.flat_map(|group| {
+        group.runs.iter().map(|run| ExportedRun {
+            experiment: group.experiment.clone(),
+            setting: group.setting(),
+            id: run.id.clone(),
+            finished: run.finished.clone(),
+        })
+    })
 }
 
 #[cfg(test)]

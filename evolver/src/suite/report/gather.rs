@@ -6,9 +6,7 @@ use crate::suite::plan::{Plan, PlannedExperiment, PlannedRun, PlannedSettings, R
 use crate::suite::search::{Search, look};
 use crate::suite::{Reevaluation, Resilience, Suite};
 use minimal_surprise_controller::Controller;
-use minimal_surprise_evolution::baseline::{
-    Chance, GENOMES, PLACEMENTS, ROBOTS_MAX, ceiling, constant_fitness, skill,
-};
+use minimal_surprise_evolution::baseline::{Chance, GENOMES, skill};
 use minimal_surprise_evolution::damaged_runs::DamagedRuns;
 use minimal_surprise_evolution::files::FileError;
 use minimal_surprise_evolution::finished_run::FinishedRun;
@@ -69,12 +67,7 @@ impl GatheredRun {
     /// Returns the skill of the fitness beyond a constant prediction; `None` if it is undefined.
     #[must_use]
     pub fn skill(&self) -> Option<f64> {
-        let scenario = self.finished.settings.scenario();
-        skill(
-            self.fitness(),
-            constant_fitness(scenario),
-            ceiling(scenario),
-        )
+        skill(self.fitness(), self.finished.settings.scenario())
     }
 
     /// Returns the structure that the run counts for in tests; ties go to the first in the paper's
@@ -114,7 +107,7 @@ pub struct Group {
     /// The finished runs, by seed.
     pub runs: Vec<GatheredRun>,
     /// What chance gives under these settings; `None` without finished runs, for runs beyond the
-    /// plan, and for swarms of more than [`ROBOTS_MAX`] robots.
+    /// plan, and for swarms of more than [`ROBOTS_MAX`](minimal_surprise_evolution::baseline::ROBOTS_MAX) robots.
     pub chance: Option<GroupChance>,
 }
 
@@ -131,19 +124,16 @@ impl GroupChance {
     /// Draws the baselines of settings. The draws do not depend on the seeds of the runs.
     fn draw(settings: &Settings) -> Result<Option<Self>, WorldError> {
         let scenario = settings.scenario();
-        if scenario.robots() > ROBOTS_MAX {
+        let placements = Chance::of_default_placements(scenario.grid(), scenario.robots())?;
+        let Some(placements) = placements else {
             return Ok(None);
-        }
-        let seeds = SeedTree::new(0);
+        };
         let (topology, repetitions) = (settings.topology(), settings.repetitions());
+        let seeds = SeedTree::new(0);
+        let genomes = Chance::of_genomes(topology, scenario, repetitions, seeds, GENOMES)?;
         Ok(Some(Self {
-            placements: Chance::of_placements(
-                scenario.grid(),
-                scenario.robots(),
-                seeds,
-                PLACEMENTS,
-            )?,
-            genomes: Chance::of_genomes(topology, scenario, repetitions, seeds, GENOMES)?,
+            placements,
+            genomes,
         }))
     }
 

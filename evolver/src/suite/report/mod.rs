@@ -19,7 +19,8 @@ pub mod tables;
 mod wording;
 
 use super::Suite;
-use contents::{SuiteReport, run_rows};
+use crate::data::{self, ExportError};
+use contents::{SuiteReport, exported};
 use figures::FigureError;
 use gather::{GatherError, Gathered};
 use minimal_surprise_evolution::files::{self, FileError, TEXT_BYTES_MAX};
@@ -41,6 +42,9 @@ pub enum ReportError {
     /// A run cannot be read or executed again.
     #[error(transparent)]
     Gather(#[from] GatherError),
+    /// The table of runs cannot be created.
+    #[error(transparent)]
+    Data(#[from] ExportError),
     /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
@@ -117,7 +121,7 @@ pub fn write(
     let mut files = vec![
         ("report.html".to_owned(), html::page(&report)),
         ("report.md".to_owned(), markdown::text(&report)),
-        ("runs.csv".to_owned(), csv_text(&run_rows(gathered))),
+        ("runs.csv".to_owned(), data::runs_text(exported(gathered))?),
         ("findings.csv".to_owned(), csv_text(&report.findings)),
         ("how-made.csv".to_owned(), csv_text(&report.making)),
     ];
