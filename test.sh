@@ -141,6 +141,9 @@ say 'packages'
 cargo package --locked --workspace --exclude tests --exclude robot-support --allow-dirty --no-verify
 
 say 'tests'
+# Many tests run the release program. It is built beside the tests, because the last crates of both
+# builds leave a core idle; a test that needs it waits for this build, and reports its errors.
+cargo build --quiet --locked --release --package minimal-surprise-evolver --bin evolver &
 # Many tests wait for other programs, so more of them can run than there are cores.
 RUST_TEST_THREADS=${RUST_TEST_THREADS:-$((2 * $(getconf _NPROCESSORS_ONLN)))}
 export RUST_TEST_THREADS

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use targets::{TARGETS, Target, check, tests_folder};
 
 /// Time for which a target is tested with mutants. No result depends on the number of mutants.
-const TIME: Duration = Duration::from_secs(2);
+const TIME: Duration = Duration::from_secs(5);
 /// Number of the series of mutants: the same series contains the same mutants on every machine.
 const SERIES: u64 = 1;
 
