@@ -3,6 +3,7 @@
 use minimal_surprise_evolution::settings::SETTINGS;
 use std::fs;
 use std::path::Path;
+use tests::program::Evolver;
 
 /// Returns the table of settings for `docs/settings.md`.
 fn table() -> String {
@@ -47,4 +48,35 @@ fn the_tables_of_exported_data_are_in_the_documents() {
         text.ends_with(&tables),
         "docs/data.md must end with these tables:\n{tables}"
     );
+}
+
+#[test]
+fn the_readme_shows_the_hashes_and_the_genome_of_seed_1() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
+    let readme = fs::read_to_string(&path).unwrap();
+    let evolver = Evolver::in_empty_folder();
+    let run = evolver.run(&[
+        "evolve",
+        "--seed",
+        "1",
+        "--out",
+        "run",
+        "--progress",
+        "none",
+    ]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let done = evolver.text("run/DONE");
+    let simulated = evolver.run(&["hil", "run", "--simulate"]);
+    let simulated = simulated.stdout.trim().rsplit(' ').next().unwrap();
+    let source = evolver.run(&["export", "run", "--format", "c"]).stdout;
+    let name = source
+        .lines()
+        .find_map(|line| line.split("genome_run_").nth(1));
+    let crc: String = name.unwrap().chars().take(8).collect();
+    for shown in [done.trim(), simulated, &crc] {
+        assert!(
+            shown.len() >= 8 && readme.contains(shown),
+            "README.md does not show {shown}"
+        );
+    }
 }
