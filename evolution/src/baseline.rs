@@ -52,10 +52,12 @@ pub fn constant_fitness(scenario: &Scenario) -> f64 {
     set.max(1.0 - set)
 }
 
-/// Returns 1 − η, 0 to 1: with noise η no prediction is right more often, unless η exceeds one half.
+/// Returns the highest possible fitness, 0.5 to 1, because no prediction can foresee flipped bits:
+/// 1 − η; with noise η above one half, η, by predicting the opposite.
 #[must_use]
 pub fn ceiling(scenario: &Scenario) -> f64 {
-    1.0 - noise(scenario.noise())
+    let noise = noise(scenario.noise());
+    noise.max(1.0 - noise)
 }
 
 fn noise(rate: NoiseRate) -> f64 {
@@ -74,8 +76,8 @@ pub fn constant_fitness_of_readings(average_readings: &[f64]) -> f64 {
     best.sum::<f64>() / average_readings.len() as f64
 }
 
-/// Returns the skill of a fitness F, (F − F₀) / (1 − η − F₀): 1 for perfect prediction, 0 for the
-/// fitness F₀ of the constant prediction, negative below. `None` if 1 − η exceeds F₀ by no more than
+/// Returns the skill of a fitness F, (F − F₀) / (C − F₀) with the [`ceiling`] C: 1 for perfect prediction, 0 for the
+/// fitness F₀ of the constant prediction, negative below. `None` if C exceeds F₀ by no more than
 /// [`LEAST_ROOM`], because the ratio of such small differences is arbitrary.
 #[must_use]
 pub fn skill(fitness: f64, scenario: &Scenario) -> Option<f64> {
@@ -94,7 +96,7 @@ pub struct FitnessBaselines {
     pub constant_fitness: f64,
     /// [`constant_fitness_of_readings`] of the run, 0.5 to 1.
     pub constant_fitness_of_readings: f64,
-    /// [`ceiling`], 0 to 1.
+    /// [`ceiling`], 0.5 to 1.
     pub ceiling: f64,
     /// [`skill`] of the fitness.
     pub skill: Option<f64>,
@@ -319,6 +321,8 @@ mod tests {
         let scenario = scenario(15, 15, 100, 0.0);
         assert_eq!(skill(1.0, &scenario), Some(1.0));
         assert_eq!(skill(constant_fitness(&scenario), &scenario), Some(0.0));
+        let inverted = self::scenario(15, 15, 100, 0.75);
+        assert_eq!(ceiling(&inverted), 0.75);
     }
 
     #[test]

@@ -6,6 +6,7 @@
 use crate::files::{self, FileError};
 use crate::lock::{LOCK, Lock, LockError};
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// A directory being created. If it is dropped before it is published, it is removed.
@@ -33,7 +34,13 @@ impl NewDir {
     /// [`FileError`] if the directory cannot be created.
     pub fn unchecked_beside(place: &Path) -> Result<Self, FileError> {
         let parent = files::parent(place);
-        fs::create_dir_all(parent).map_err(FileError::at(parent))?;
+        fs::create_dir_all(parent)
+            .map_err(|error| match error.kind() {
+                // A file is in the way: "already exists" would not say so.
+                ErrorKind::AlreadyExists => ErrorKind::NotADirectory.into(),
+                _ => error,
+            })
+            .map_err(FileError::at(parent))?;
         loop {
             let part = files::beside(place);
             fs::create_dir(&part).map_err(FileError::at(place))?;
