@@ -219,6 +219,14 @@ fn a_suite_is_exported_as_tables_that_agree_with_its_runs() {
         assert_eq!(number, rows, "{}", path.display());
     }
 
+    let twice = export.replace("--to data", "--to twice") + ",runs,steps";
+    assert_eq!(evolver.run(&words(&twice)).code, Some(0));
+    for file in ["runs.csv", "steps.csv", "datapackage.json"] {
+        let [once, twice] =
+            ["data", "twice"].map(|folder| evolver.read(&format!("{folder}/{file}")));
+        assert!(once == twice, "{file}: a table named twice is written once");
+    }
+
     let again = evolver.run(&words(export));
     assert_eq!(
         again.code,
@@ -275,7 +283,9 @@ fn one_run_is_exported_with_the_values_that_classify_prints() {
         "export run --format csv",
         "export run --format c --to data2",
         "export run --format csv --to data2 --out file",
+        "export run --format c --what runs",
         "export run/best.genome --format csv --to data2",
+        "export run --format csv --to run/config.toml/data2",
         "export run --format csv --to data",
     ] {
         let run = evolver.run(&words(flags));

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `evolver export`.
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// The genome file or a run directory; for trajectories, the run directory.
+    /// The genome file or a run directory; for trajectory and csv, a run directory.
     #[arg(value_name = "GENOME|RUN")]
     from: PathBuf,
     /// The format.
@@ -28,13 +28,8 @@ pub struct ExportArgs {
     /// For csv: the directory to write; must not exist.
     #[arg(long, value_name = "DIR")]
     to: Option<PathBuf>,
-    /// For csv: tables, as in runs,steps.
-    #[arg(
-        long,
-        value_enum,
-        value_delimiter = ',',
-        default_value = "runs,generations,steps"
-    )]
+    /// For csv: tables, as in runs,robots [default: runs,generations,steps].
+    #[arg(long, value_enum, value_delimiter = ',')]
     what: Vec<Table>,
     /// The file to write; must not exist [default: standard output].
     #[arg(long, value_name = "FILE")]
@@ -96,8 +91,13 @@ pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
     if arguments.name.is_some() && !matches!(arguments.format, Format::C | Format::Rust) {
         return Err(BadInput::new("--name requires --format c or --format rust").into());
     }
-    if arguments.to.is_some() != (arguments.format == Format::Csv) {
-        return Err(BadInput::new("--to and --format csv require each other").into());
+    match (arguments.format == Format::Csv, &arguments.to) {
+        (true, None) => return Err(BadInput::new("--format csv requires --to DIR").into()),
+        (false, Some(_)) => return Err(BadInput::new("--to requires --format csv").into()),
+        (false, None) if !arguments.what.is_empty() => {
+            return Err(BadInput::new("--what requires --format csv").into());
+        }
+        _ => {}
     }
     if let Some(to) = &arguments.to {
         return tables(arguments, to);
@@ -135,6 +135,7 @@ pub fn export(arguments: &ExportArgs) -> anyhow::Result<()> {
 }
 
 fn tables(arguments: &ExportArgs, to: &Path) -> anyhow::Result<()> {
+    needs_run(arguments, "tables")?;
     if arguments.out.is_some() {
         return Err(BadInput::new("--out cannot be combined with --format csv; use --to").into());
     }
@@ -146,7 +147,11 @@ fn tables(arguments: &ExportArgs, to: &Path) -> anyhow::Result<()> {
         id: name.to_string_lossy().into_owned(),
         finished: FinishedRun::read_and_check(&arguments.from).map_err(unusable)?,
     };
-    data::write(to, &arguments.what, std::iter::once(run)).map_err(unusable)?;
+    let what = match arguments.what.as_slice() {
+        [] => &[Table::Runs, Table::Generations, Table::Steps],
+        what => what,
+    };
+    data::write(to, what, std::iter::once(run)).map_err(unusable)?;
     show_line!("{}", terminal_path(to));
     Ok(())
 }
@@ -155,14 +160,19 @@ fn is_for_a_chip(format: Format) -> bool {
     matches!(format, Format::Bin | Format::Slot)
 }
 
-fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
-    if arguments.from.is_file() {
-        return Err(BadInput::new(format!(
-            "{}: a trajectory can be exported only from a run directory, not from a file",
+/// Rejects a genome file where a run directory is needed.
+fn needs_run(arguments: &ExportArgs, what: &str) -> Result<(), BadInput> {
+    match arguments.from.is_file() {
+        false => Ok(()),
+        true => Err(BadInput::new(format!(
+            "{}: {what} can be exported only from a run directory, not from a file",
             arguments.from.display()
-        ))
-        .into());
+        ))),
     }
+}
+
+fn trajectory(arguments: &ExportArgs) -> anyhow::Result<Vec<u8>> {
+    needs_run(arguments, "a trajectory")?;
     let finished = FinishedRun::read_and_check(&arguments.from).map_err(unusable)?;
     let needs = Needs::of_trajectory(finished.settings.scenario());
     needs.check_memory().map_err(BadInput::new)?;

@@ -5,11 +5,11 @@
 
 mod tables;
 
-use clap::ValueEnum;
+pub use tables::{Cell, Column, ExportedRun, Table};
+
 use minimal_surprise_evolution::files::{self, FileError};
-use minimal_surprise_evolution::finished_run::FinishedRun;
 use minimal_surprise_evolution::new_dir::NewDir;
-use minimal_surprise_evolution::settings::{Scalar, ScalarKind};
+use minimal_surprise_evolution::settings::ScalarKind;
 use minimal_surprise_sim::WorldError;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -21,38 +21,6 @@ use tables::weights_max;
 /// File name of the description.
 const PACKAGE: &str = "datapackage.json";
 
-/// A table of data.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
-pub enum Table {
-    /// One row per run: settings, outcomes, baselines.
-    Runs,
-    /// One row per generation of a run.
-    Generations,
-    /// One row per step of the final run of the best genome.
-    Steps,
-    /// One row per robot and step of that run.
-    Robots,
-    /// One row per run: the weights of the best genome.
-    Genomes,
-}
-
-/// A column of a table.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Column {
-    /// Name in the header.
-    pub name: String,
-    /// Type.
-    pub kind: ScalarKind,
-    /// Unit; empty for numbers without a unit and for text.
-    pub unit: &'static str,
-    /// Meaning.
-    pub meaning: String,
-}
-
-/// A value of a row; `None` if it is missing. A number is printed as the shortest text that gives
-/// the same 64-bit number.
-pub type Cell = Option<Scalar>;
-
 /// Returns a type's name in Frictionless Data.
 fn name_of(kind: ScalarKind) -> &'static str {
     match kind {
@@ -60,19 +28,6 @@ fn name_of(kind: ScalarKind) -> &'static str {
         ScalarKind::Integer => "integer",
         ScalarKind::Float => "number",
     }
-}
-
-/// A run to be exported.
-#[derive(Clone, Debug)]
-pub struct ExportedRun {
-    /// The experiment; empty for a single run.
-    pub experiment: String,
-    /// Label of the settings in a suite; empty for a single run.
-    pub setting: String,
-    /// Run ID in a suite, otherwise the run's directory name.
-    pub id: String,
-    /// The run.
-    pub finished: FinishedRun,
 }
 
 /// Data could not be exported.
@@ -111,7 +66,7 @@ pub fn write(
     for &table in &tables {
         let path = new.path().join(table.file_name());
         let file = File::create(&path).map_err(FileError::at(&path))?;
-        writers.push(table.writer(BufWriter::new(file))?);
+        writers.push(writer(table, BufWriter::new(file))?);
     }
     // Experiments may share runs; only the table of runs has a row for each.
     let mut seen = BTreeSet::new();
@@ -119,7 +74,7 @@ pub fn write(
         let is_new = seen.insert(run.id.clone());
         for (table, csv) in tables.iter().zip(&mut writers) {
             if is_new || *table == Table::Runs {
-                table.write_run(&run, csv)?;
+                write_run(*table, &run, csv)?;
             }
         }
     }
@@ -140,89 +95,44 @@ pub fn write(
 /// # Errors
 /// [`ExportError`] if a run cannot be repeated.
 pub fn runs_text(runs: impl Iterator<Item = ExportedRun>) -> Result<String, ExportError> {
-    let mut csv = Table::Runs.writer(Vec::new())?;
+    let mut csv = writer(Table::Runs, Vec::new())?;
     for run in runs {
-        Table::Runs.write_run(&run, &mut csv)?;
+        write_run(Table::Runs, &run, &mut csv)?;
     }
     let bytes = csv.into_inner();
     let bytes = bytes.expect("flushing a buffer in memory cannot fail");
     Ok(String::from_utf8(bytes).expect("text stays text"))
 }
 
-impl Table {
-    /// All tables, in the order of the document.
-    pub const ALL: [Self; 5] = [
-        Self::Runs,
-        Self::Generations,
-        Self::Steps,
-        Self::Robots,
-        Self::Genomes,
-    ];
+/// Creates a table that has only its header.
+fn writer<W: Write>(table: Table, to: W) -> Result<csv::Writer<W>, ExportError> {
+    let mut csv = csv::Writer::from_writer(to);
+    let columns = table.columns(weights_max());
+    let names = columns.iter().map(|column| &column.name);
+    csv.write_record(names).map_err(failed(table))?;
+    Ok(csv)
+}
 
-    /// Returns the table's name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Runs => "runs",
-            Self::Generations => "generations",
-            Self::Steps => "steps",
-            Self::Robots => "robots",
-            Self::Genomes => "genomes",
+/// Adds the rows of a run.
+fn write_run<W: Write>(
+    table: Table,
+    run: &ExportedRun,
+    csv: &mut csv::Writer<W>,
+) -> Result<(), ExportError> {
+    let mut written = Ok(());
+    table.rows(run, &mut |row| {
+        if written.is_ok() {
+            let row = row.into_iter();
+            let row = row.map(|cell| cell.map_or_else(String::new, |cell| cell.to_string()));
+            written = csv.write_record(row);
         }
-    }
+    })?;
+    written.map_err(failed(table))
+}
 
-    fn file_name(self) -> String {
-        format!("{}.csv", self.name())
-    }
-
-    /// Describes the rows.
-    #[must_use]
-    pub fn meaning(self) -> &'static str {
-        match self {
-            Self::Runs => "One row per run: settings, outcomes and baselines.",
-            Self::Generations => "One row per generation of a run.",
-            Self::Steps => {
-                "One row per step of the final run, in which the best genome runs again from the \
-                 start that determined its fitness."
-            }
-            Self::Robots => "One row per robot and step of the final run.",
-            Self::Genomes => {
-                "One row per run: the weights of the best genome, in the order of the genome \
-                 container. Genomes of smaller networks leave the last columns empty."
-            }
-        }
-    }
-
-    /// Creates a table that has only its header.
-    fn writer<W: Write>(self, to: W) -> Result<csv::Writer<W>, ExportError> {
-        let mut csv = csv::Writer::from_writer(to);
-        let columns = self.columns(weights_max());
-        let names = columns.iter().map(|column| &column.name);
-        csv.write_record(names).map_err(self.failed())?;
-        Ok(csv)
-    }
-
-    /// Adds the rows of a run.
-    fn write_run<W: Write>(
-        self,
-        run: &ExportedRun,
-        csv: &mut csv::Writer<W>,
-    ) -> Result<(), ExportError> {
-        let mut written = Ok(());
-        self.rows(run, &mut |row| {
-            if written.is_ok() {
-                let row = row.into_iter();
-                let row = row.map(|cell| cell.map_or_else(String::new, |cell| cell.to_string()));
-                written = csv.write_record(row);
-            }
-        })?;
-        written.map_err(self.failed())
-    }
-
-    fn failed(self) -> impl FnOnce(csv::Error) -> ExportError {
-        let table = self.file_name();
-        move |source| ExportError::Csv { table, source }
-    }
+fn failed(table: Table) -> impl FnOnce(csv::Error) -> ExportError {
+    let table = table.file_name();
+    move |source| ExportError::Csv { table, source }
 }
 
 /// Describes tables as a Frictionless data package.

@@ -1,12 +1,103 @@
 //! The columns and rows of each table.
 
-use super::{Cell, Column, ExportedRun, Table};
 use ScalarKind::{Float, Integer, Text};
+use clap::ValueEnum;
 use minimal_surprise_controller::{Action, Prediction, SensorModel, Topology, Turn};
 use minimal_surprise_evolution::baseline::FitnessBaselines;
+use minimal_surprise_evolution::finished_run::FinishedRun;
 use minimal_surprise_evolution::settings::{SETTINGS, Scalar, ScalarKind, Setting};
 use minimal_surprise_sim::WorldError;
 use minimal_surprise_sim::structures::{Structure, classify};
+
+/// A table of data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum Table {
+    /// One row per run: settings, outcomes, baselines.
+    Runs,
+    /// One row per generation of a run.
+    Generations,
+    /// One row per step of the final run of the best genome.
+    Steps,
+    /// One row per robot and step of that run.
+    Robots,
+    /// One row per run: the weights of the best genome.
+    Genomes,
+}
+
+/// A column of a table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// Name in the header.
+    pub name: String,
+    /// Type.
+    pub kind: ScalarKind,
+    /// Unit; empty for numbers without a unit and for text.
+    pub unit: &'static str,
+    /// Meaning.
+    pub meaning: String,
+}
+
+/// A value of a row; `None` if it is missing. A number is printed as the shortest text that gives
+/// the same 64-bit number.
+pub type Cell = Option<Scalar>;
+
+/// A run to be exported.
+#[derive(Clone, Debug)]
+pub struct ExportedRun {
+    /// The experiment; empty for a single run.
+    pub experiment: String,
+    /// Label of the settings in a suite; empty for a single run.
+    pub setting: String,
+    /// Run ID in a suite, otherwise the run's directory name.
+    pub id: String,
+    /// The run.
+    pub finished: FinishedRun,
+}
+
+impl Table {
+    /// All tables, in the order of the document.
+    pub const ALL: [Self; 5] = [
+        Self::Runs,
+        Self::Generations,
+        Self::Steps,
+        Self::Robots,
+        Self::Genomes,
+    ];
+
+    /// Returns the table's name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Runs => "runs",
+            Self::Generations => "generations",
+            Self::Steps => "steps",
+            Self::Robots => "robots",
+            Self::Genomes => "genomes",
+        }
+    }
+
+    pub(super) fn file_name(self) -> String {
+        format!("{}.csv", self.name())
+    }
+
+    /// Describes the rows.
+    #[must_use]
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Self::Runs => "One row per run: settings, outcomes and baselines.",
+            Self::Generations => "One row per generation of a run.",
+            Self::Steps => {
+                "One row per step of the final run, in which the best genome runs again from the \
+                 start that determined its fitness."
+            }
+            Self::Robots => "One row per robot and step of the final run.",
+            Self::Genomes => {
+                "One row per run: the weights of the best genome, in the order of the genome \
+                 container. Genomes of smaller networks leave the last columns empty."
+            }
+        }
+    }
+}
 
 /// Returns the number of weights of the largest genome.
 pub(super) fn weights_max() -> usize {

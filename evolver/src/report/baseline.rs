@@ -51,7 +51,7 @@ pub fn text(baselines: &Baselines<'_>) -> String {
     }
     let fitness = genomes.sorted_fitness();
     format!(
-        "{} on {}, {} robots, {} steps, noise {}; seed {}\n\n\
+        "{} on {}, swarm size {}, {} steps, noise {}; seed {}\n\n\
          constant prediction on random states  {:.4}\n\
          ceiling                               {:.4}\n\
          random genomes, median                {:.4}\n\

@@ -111,6 +111,16 @@ impl<'a> Chosen<'a> {
         }
     }
 
+    /// Returns the error for a directory without a finished run.
+    pub(super) fn nothing_finished(&self) -> BadInput {
+        BadInput::new(format!(
+            "{}: no run of this suite is finished there; execute the runs with: {}; or name their \
+             directory with --out",
+            self.directory.display(),
+            self.command()
+        ))
+    }
+
     /// Returns the command that executes the runs and the searches.
     pub(super) fn command(&self) -> String {
         let mut words = vec![self.source.called.clone(), "run".to_owned()];

@@ -1,7 +1,6 @@
 //! `export`: writes the finished runs as tables for other programs.
 
 use super::choice::Chosen;
-use crate::commands::BadInput;
 use crate::commands::errors::{name_damaged, unusable};
 use crate::data::{self, ExportedRun, Table};
 use crate::exit::Exit;
@@ -29,7 +28,7 @@ pub struct ExportOptions {
 /// Writes tables of all finished runs.
 ///
 /// # Errors
-/// [`BadInput`] if no run is finished or the directory exists; otherwise if a file cannot be
+/// [`BadInput`](crate::commands::BadInput) if no run is finished or the directory exists; otherwise if a file cannot be
 /// written.
 pub(super) fn export(chosen: &Chosen, options: &ExportOptions) -> anyhow::Result<Exit> {
     let mut damaged = DamagedRuns::default();
@@ -55,12 +54,7 @@ pub(super) fn export(chosen: &Chosen, options: &ExportOptions) -> anyhow::Result
     if runs.peek().is_none() {
         drop(runs);
         if damaged.is_empty() {
-            return Err(BadInput::new(format!(
-                "{}: the directory contains no finished run of this suite; --out names the \
-                 directory of the runs",
-                chosen.directory.display()
-            ))
-            .into());
+            return Err(chosen.nothing_finished().into());
         }
         return Ok(name_damaged(&damaged, Some(&chosen.command())));
     }

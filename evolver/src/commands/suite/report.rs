@@ -56,12 +56,7 @@ pub(super) fn write(chosen: &Chosen, options: &ReportOptions) -> anyhow::Result<
         return Ok(name_damaged(&gathered.damaged, Some(&again)));
     }
     if finished.is_empty() {
-        return Err(BadInput::new(format!(
-            "{}: contains no complete run of this suite; set the directory of its runs with \
-             --out",
-            chosen.directory.display()
-        ))
-        .into());
+        return Err(chosen.nothing_finished().into());
     }
     let mut damaged = gathered.damaged.clone();
     if options.gallery {

@@ -48,8 +48,11 @@ pub fn page(report: &SuiteReport) -> String {
         page += &rendered(&paragraphs.join("\n"));
     }
     write_findings(&mut page, report);
-    let ours = "Ours in bold, below it the 95 % interval";
-    let reading = reading(report, ours, " and the paper's number");
+    let reading = reading(
+        report,
+        "Ours in bold, below it the 95 % interval and the paper's number.",
+        "Values in bold, below them the 95 % interval.",
+    );
     let _ = writeln!(page, "<h2>Tables</h2>\n<p>{reading}</p>");
     for table in &report.tables {
         write_table(&mut page, table);

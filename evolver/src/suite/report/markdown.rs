@@ -32,7 +32,11 @@ pub fn text(report: &SuiteReport) -> String {
             );
         }
     }
-    let reading = reading(report, "Ours [95 % interval]", " · paper's");
+    let reading = reading(
+        report,
+        "Ours [95 % interval] · paper's.",
+        "Value [95 % interval].",
+    );
     let _ = writeln!(text, "\n## Tables\n\n{reading}");
     for table in &report.tables {
         write_table(&mut text, table);

@@ -19,9 +19,12 @@ pub(super) const VERDICTS: &str = "*Holds* and *differs* state whether the claim
                                    least 5 % of equally large samples of either have as many.";
 
 /// Returns the explanation of the numbers in a table.
-pub(super) fn reading(report: &SuiteReport, ours: &str, paper: &str) -> String {
-    let paper = if report.has_paper { paper } else { "" };
-    format!("{ours}{paper}.")
+pub(super) fn reading<'a>(report: &SuiteReport, beside_paper: &'a str, alone: &'a str) -> &'a str {
+    if report.has_paper {
+        beside_paper
+    } else {
+        alone
+    }
 }
 
 /// Note for experiments that share runs.

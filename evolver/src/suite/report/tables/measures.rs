@@ -167,9 +167,9 @@ pub(super) fn numbers(experiment: &str, groups: &[&Group], paper: &PaperValues) 
         .collect();
     sources.dedup();
     let note = if sources.is_empty() {
-        "Medians with bootstrap 95 % interval."
+        "Medians; with six runs or more, their bootstrap 95 % interval."
     } else {
-        "Medians with bootstrap 95 % interval and sign test against the paper's median, where the \
+        "Medians, with six runs or more their bootstrap 95 % interval, and sign test against the paper's median, where the \
          printed number counts as exact to half its last digit; percentages with Wilson's \
          interval and Fisher's test."
     };
